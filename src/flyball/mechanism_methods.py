@@ -33,8 +33,7 @@ else:
 
 
 def on_one_thread(method: Callable[..., Any], *, by_scipy: bool) -> Callable[..., Any]:
-    """Wrap a method so that it runs with BLAS on one thread; ``by_scipy``: it needs SciPy's BLAS, which is loaded
-    first.
+    """Wrap a method so that it runs with BLAS on one thread; ``by_scipy``: it needs SciPy's BLAS, to be loaded first.
 
     The number of BLAS threads is a setting of the process. Only Python's main thread changes it, and restores it when
     the method ends.

@@ -42,7 +42,7 @@ NEGLIGIBLE_GAP = 1e-9  # negligible gap, relative to the mechanism's length, or 
 
 
 def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
-    """Return the error that names elements with inconsistent constraints, worst first; ``best`` is the nearest state."""
+    """Return the error that names elements with inconsistent constraints, worst first; ``best``: the nearest state."""
     t = best.t
     c.at(t, best.q, best.v)
     g = c.work.rows.value
@@ -231,7 +231,7 @@ def consistent_state(
 
 
 def _has_own_poses(c: CompiledMechanism) -> bool:
-    """Return whether reference angles and curve positions differ from those of the values that differ in forces only."""
+    """Return whether reference angles and curve positions differ from those of values that differ in forces only."""
     x, n = c.values, len(c.structure.controls)
     if (other := x.alike) is None:
         return True

@@ -41,9 +41,7 @@ class CompiledMechanism:
     z: np.ndarray  # controller states, angles and curve positions as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values that replace the model's own
     system: System = field(init=False, repr=False, compare=False)  # tables of `values`, or with addresses of `made`
-    made: Any = field(
-        default=None, init=False, repr=False, compare=False
-    )  # generated code in use; None: general engine
+    made: Any = field(default=None, init=False, repr=False, compare=False)  # generated code; None: general engine
 
     def __post_init__(self) -> None:
         self.system = self.values.system
@@ -374,8 +372,7 @@ def tangent_step(c: CompiledMechanism, q: np.ndarray, other: np.ndarray) -> np.n
     """Return the step along the velocities from one position to another, (nv,), as ``retract`` takes it.
 
     Rotations of bodies in space are Cayley steps, 2 tan(angle / 2) about the axis, bounded near half a turn. Planar
-    angles
-    include whole turns.
+    angles include whole turns.
     """
     S = c.values.system
     out = np.zeros(c.structure.nv)

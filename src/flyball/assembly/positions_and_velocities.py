@@ -1,12 +1,12 @@
 """Closed positions from rough guesses, and consistent velocities at a closed position.
 
-Positions: damped Gauss-Newton with steps of least weighted size. Velocities, in this order: the constraints are
-fulfilled, with the rates that drivers and initial conditions prescribe; described velocities are kept exactly
-where the constraints allow it, else as nearly as possible, measured by the kinetic energy of the difference; what
-is left free gets the least kinetic energy of the whole (Thomson's theorem).
+Positions are found by damped Gauss-Newton with steps of least weighted size. Velocities are determined in this order.
+The constraints are satisfied, with the rates that drivers and initial conditions prescribe. Described velocities are
+kept exactly where the constraints allow it, else as nearly as possible, measured by the kinetic energy of the
+difference. The remaining velocities minimise the kinetic energy of the whole mechanism (Thomson's theorem).
 
-A body may be given the velocity of its reference frame's origin, its angular velocity, both or neither, along
-world axes. What is not given is free.
+For a body the velocity of its reference frame's origin, its angular velocity, both or neither may be given, in world
+axes. What is not given is free.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from ..tables.values import Values
 from .compiled_mechanism import CompiledMechanism, compile_mechanism
 
 VELOCITY_TOLERANCE = (
-    1e-6  # part of a velocity by which it may differ from the given one, near singular positions, and is still kept
+    1e-6  # relative deviation of a velocity, near singular positions, that still counts as the given one
 )
-NEGLIGIBLE_VELOCITY = 1e-9  # part of the mechanism's largest velocity that is none
+NEGLIGIBLE_VELOCITY = 1e-9  # negligible velocity, relative to the mechanism's largest
 
 
 @dataclass(frozen=True)
 class GivenVelocity:
-    """A body that is told how it moves."""
+    """The given velocities of a body."""
 
     name: str
-    at: int  # its first velocity
-    translations: int  # how many of its velocities are translations
-    turns: int  # and how many are not
+    at: int  # index of its first velocity
+    translations: int  # number of translational velocities
+    turns: int  # number of angular velocities
     origin: bool  # whether the velocity of its reference frame's origin is given
-    turning: bool  # whether its angular velocity is
+    turning: bool  # whether its angular velocity is given
     as_drawn: bool
 
     @property
     def whole(self) -> bool:
-        """Whether nothing of it is free."""
+        """Whether all its velocities are given."""
         return self.origin and (self.turning or not self.turns)
 
     @property
     def n(self) -> int:
-        """How many velocities it has."""
+        """Number of its velocities."""
         return self.translations + self.turns
 
     @property
@@ -62,12 +62,12 @@ class GivenVelocity:
 
 
 def given_velocities(x: Values) -> list[GivenVelocity]:
-    """Bodies that are told how they move; of a mechanism in absolute coordinates."""
+    """Return the bodies with given velocities; for a mechanism in absolute coordinates."""
     return [g for g in _all_bodies(x) if g.origin or g.turning]
 
 
 def _all_bodies(x: Values) -> list[GivenVelocity]:
-    """All bodies, with what is given of each."""
+    """Return all bodies, with what is given of each."""
     out = []
     shifts = 2 if x.structure.model.planar else 3
     for b in x.structure.model.bodies:
@@ -80,9 +80,9 @@ def _all_bodies(x: Values) -> list[GivenVelocity]:
 
 
 def described_velocities(x: Values, q: np.ndarray) -> np.ndarray:
-    """Velocities (nv,) of bodies alone at the pose q: those of the least kinetic energy that are as described.
+    """Return the velocities (nv,) of bodies alone at the pose q with least kinetic energy that are as described.
 
-    Steps of least kinetic energy from here on to the constraints lead to the least of all.
+    Steps of least kinetic energy from these to the constraints lead to the least energy of all.
     """
     v = np.zeros(x.structure.nv, np.result_type(x.v, q))
     for g in given_velocities(x):
@@ -91,7 +91,7 @@ def described_velocities(x: Values, q: np.ndarray) -> np.ndarray:
 
 
 def _described_velocity(x: Values, g: GivenVelocity, q: np.ndarray) -> list[Any]:
-    """Velocities of one body as described: the mass centre of one that is told its turn only rests."""
+    """Return the velocities of one body as described; if only its angular velocity is given, its mass centre rests."""
     d, R = x.bodies[g.name], body_rotation(x, g.name, q)
     if not g.turns:
         return list(_origin_velocity(d)[: g.translations])
@@ -101,9 +101,9 @@ def _described_velocity(x: Values, g: GivenVelocity, q: np.ndarray) -> list[Any]
 
 
 def _angular_velocity_of_impulse(x: Values, g: GivenVelocity, u: np.ndarray) -> np.ndarray:
-    """The turn that a blow at a body's origin gives it besides the velocity u of that origin, all in its axes.
+    """Return the angular velocity caused by an impulse at a body's origin that gives it the velocity u, in body axes.
 
-    The turn w of least m |u + w x c|^2 + w J w. Missing inertias have stand-ins.
+    It is the w of least m |u + w x c|^2 + w J w. Missing inertias are substituted.
     """
     d, table, b = x.bodies[g.name], x.system.bodies, x.structure.place[g.name]
     J = (table.inertia[b] + table.excess_inertia[b]).reshape(3, 3)
@@ -113,17 +113,17 @@ def _angular_velocity_of_impulse(x: Values, g: GivenVelocity, u: np.ndarray) -> 
 
 
 def _cross_product(a: Any, b: Any) -> np.ndarray:
-    """Cross product; NumPy's own takes ten times as long."""
+    """Return the cross product; NumPy's own takes ten times as long."""
     return np.array(cross(a, b))
 
 
 def _origin_velocity(d: Any) -> np.ndarray:
-    """Velocity of the reference frame's origin, as described."""
+    """Return the velocity of the reference frame's origin, as described."""
     return d.v - _cross_product(d.w, d.R @ d.com)
 
 
 def body_rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
-    """Rotation of a body at q; to the bit as it is drawn where it was not turned."""
+    """Return the rotation of a body at q; the reference rotation to the last bit where it was not rotated."""
     b = x.structure.place[name]
     if x.system.tree.joint[b] == POINT:
         return x.bodies[name].R
@@ -136,9 +136,11 @@ def body_rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
 
 
 def velocity_deviation(x: Values, g: GivenVelocity, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """What a body's velocities have beyond those it is told: of its mass centre and the turn where both are given.
+    """Return the deviation of a body's velocities from the given ones: of mass centre and rotation where both are
+    given.
 
-    Else of its reference frame's origin along world axes, or of the turn (of a spatial body along its own axes).
+    Otherwise it is that of its reference frame's origin in world axes, or of its angular velocity (of a spatial body in
+    body axes).
     """
     d, R = x.bodies[g.name], body_rotation(x, g.name, q)
     own = v[g.at : g.at + g.n]
@@ -152,7 +154,7 @@ def velocity_deviation(x: Values, g: GivenVelocity, q: np.ndarray, v: np.ndarray
 
 
 def deviation_jacobian(x: Values, g: GivenVelocity, q: np.ndarray) -> np.ndarray:
-    """Derivatives of `velocity_deviation` by the body's own velocities."""
+    """Return the derivatives of `velocity_deviation` by the body's own velocities."""
     if g.whole:
         return np.eye(g.n)
     if g.turning:
@@ -165,7 +167,9 @@ def deviation_jacobian(x: Values, g: GivenVelocity, q: np.ndarray) -> np.ndarray
 
 
 def _frame_velocity(x: Values, g: GivenVelocity, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity of the origin of a body's reference frame, and its angular velocity, along world axes; of three each."""
+    """Return the velocity of the origin of a body's reference frame, and its angular velocity, in world axes; three
+    each.
+    """
     d, R = x.bodies[g.name], body_rotation(x, g.name, q)
     own = v[g.at : g.at + g.n]
     w = np.zeros(3) if not g.turns else np.array([0.0, 0.0, own[2]]) if g.planar else R @ own[3:]
@@ -173,7 +177,7 @@ def _frame_velocity(x: Values, g: GivenVelocity, q: np.ndarray, v: np.ndarray) -
 
 
 def velocity_departures(c: CompiledMechanism, q: np.ndarray, v: np.ndarray) -> list[InitialDeviation]:
-    """Given velocities that the state (q, v) does not have."""
+    """Return the given velocities that the state (q, v) does not have."""
     x, out = c.values, []
     told, largest = given_velocities(x), float(np.abs(v / c.sizes).max(initial=0.0)) * x.length
     for g in told:
@@ -195,10 +199,10 @@ def velocity_departures(c: CompiledMechanism, q: np.ndarray, v: np.ndarray) -> l
 
 
 def fast_velocities(c: CompiledMechanism, q: np.ndarray, v: np.ndarray, rates: np.ndarray) -> list[InitialDeviation]:
-    """Velocities that are not given and are far above all that are: what was given asks for them, or comes near to it.
+    """Return velocities that are not given and far exceed all given ones, as happens near a dead centre.
 
-    Near a dead centre, for instance. ``rates``: those that drivers and initial conditions prescribe, in 1/s. Turning is
-    compared with velocities through the mechanism's length.
+    ``rates``: those that drivers and initial conditions prescribe, in 1/s. Angular velocities are compared through the
+    mechanism's length.
     """
     x = c.values
     told = given_velocities(x)
@@ -218,24 +222,24 @@ def fast_velocities(c: CompiledMechanism, q: np.ndarray, v: np.ndarray, rates: n
     return out
 
 
-CLOSED_TOLERANCE = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
-FAR_CLOSED_TOLERANCE = 1e-6  # the same, above which a position found on residuals that lead from far away is none
+CLOSED_TOLERANCE = 1e-10  # allowed residual of closed rows, relative to the mechanism's length, or [rad]
+FAR_CLOSED_TOLERANCE = 1e-6  # the same for the residuals that converge from far away
 MAX_RESTARTS = 12
 MAX_ITERATIONS = 200
-LONGEST_STEP = 0.7  # radians, or parts of the mechanism's length, by which a step turns or shifts a body at most
+LONGEST_STEP = 0.7  # largest rotation [rad], or displacement relative to the mechanism's length, of a body in a step
 STEPS_BEFORE_WIDENING = 50  # steps of the usual length before longer ones
-DENSE_ROWS = 300  # rows up to which a step of assembly goes through a singular value decomposition
-PIVOT_REGULARIZATION = 1e-14  # added for redundant rows of large mechanisms; iterations take it out again
-COORDINATE_ROUNDING = 16 * np.finfo(float).eps  # part of a coordinate that a few operations leave uncertain
-SINGULAR_VALUE_CUTOFF = 1e-10  # singular values below this part of the largest are taken for rounding
+DENSE_ROWS = 300  # largest number of rows for which a step uses a singular value decomposition
+PIVOT_REGULARIZATION = 1e-14  # added for redundant rows of large mechanisms; iterations remove its effect
+COORDINATE_ROUNDING = 16 * np.finfo(float).eps  # relative rounding of a coordinate after a few operations
+SINGULAR_VALUE_CUTOFF = 1e-10  # relative singular value below which one counts as zero
 
 
 def largest_residual(
     c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray, uncertainty: float | None = None
 ) -> float:
-    """The largest row at a position: radians, or parts of the mechanism's length and of what rounding leaves there.
+    """Return the largest residual at a position: radians, or relative to the mechanism's length and the rounding there.
 
-    ``uncertainty``: what rounding leaves [m], if that is told.
+    ``uncertainty``: the rounding [m]; computed if not given.
     """
     c.at(t, q, v)
     g = np.abs(c.work.rows.value)
@@ -254,12 +258,14 @@ def largest_residual(
 
 
 def position_rounding(c: CompiledMechanism) -> float:
-    """What is left of a closed row [m] by rounding of the places last evaluated: far from the origin it is much."""
+    """Return the rounding of closed rows [m] at the positions last evaluated; it grows with the distance from the
+    origin.
+    """
     return COORDINATE_ROUNDING * float(np.abs(c.work.FK[:, :3]).max(initial=0.0))
 
 
 def movable_velocities(c: CompiledMechanism) -> np.ndarray:
-    """1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
+    """Return 1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
     s = c.structure
     out = np.ones(s.nv)
     for name, b in s.place.items():
@@ -270,12 +276,12 @@ def movable_velocities(c: CompiledMechanism) -> np.ndarray:
 
 
 def inverse_weights(c: CompiledMechanism) -> np.ndarray:
-    """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
+    """Return the inverse weights of assembly steps: metres against radians; 0 for bodies that must not move."""
     return np.where(_translational_velocities(c), 1.0, 1.0 / c.values.length**2) * movable_velocities(c)
 
 
 def _translational_velocities(c: CompiledMechanism) -> np.ndarray:
-    """Which velocities are those of points, not turning."""
+    """Return which velocities are translational."""
     tree = c.structure.tables["tree"]
     out = np.ones(c.structure.nv, bool)
     shifts = 2 if c.structure.model.planar else 3
@@ -285,9 +291,9 @@ def _translational_velocities(c: CompiledMechanism) -> np.ndarray:
 
 
 def _step_lengths(c: CompiledMechanism, d: np.ndarray) -> tuple[float, float]:
-    """How far a step shifts a body at most, and how far it turns one.
+    """Return the largest displacement and the largest rotation of a body in a step.
 
-    A step is as long as its vectors are, which is the same in whatever axes the world is described.
+    Vector lengths are used, which do not depend on the world axes.
     """
     tree, shifts = c.structure.tables["tree"], _translational_velocities(c)
     body = np.repeat(np.arange(len(tree.nv)), tree.nv)
@@ -298,9 +304,9 @@ def _step_lengths(c: CompiledMechanism, d: np.ndarray) -> tuple[float, float]:
 
 
 def row_scales(c: CompiledMechanism) -> np.ndarray:
-    """Factors (nr,) that make rows dimensionless: lengths are counted in the mechanism's length, turns in radians.
+    """Return factors (nr,) that make rows dimensionless: lengths relative to the mechanism's length, angles in radians.
 
-    Without them a sum of squares over rows, and what singular values are small, would depend on the unit of length.
+    Without them the sum of squares over rows, and the threshold of singular values, would depend on the unit of length.
     """
     return np.where(c.metric, 1.0 / c.values.length, 1.0)
 
@@ -308,10 +314,11 @@ def row_scales(c: CompiledMechanism) -> np.ndarray:
 def _damped_step(
     c: CompiledMechanism, r: np.ndarray, scale: np.ndarray, root: np.ndarray, damping: float
 ) -> np.ndarray:
-    """Least step with diag(scale) G d = r, in the metric of the inverse weights root^2, damped.
+    """Return the least damped step with diag(scale) G d = r, in the metric of the inverse weights root^2.
 
-    Near a singular position a combination of rows may speak of a motion by a part of 1e-8 only: where the size allows
-    it the singular values of G diag(root) are used, not their squares, which would drown in rounding.
+    Near a singular position a motion may appear in a combination of rows with a factor of only 1e-8. Where the size
+    allows it the singular values of G diag(root) are therefore used, not their squares, which would be lost in
+    rounding.
     """
     if len(r) <= DENSE_ROWS:
         G = c.jacobian()
@@ -325,7 +332,7 @@ def _damped_step(
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    # [1 B^T; B -delta] with B of unit size: B B^T would square the spread of singular values here too
+    # [1 B^T; B -delta] with B of unit size: B B^T would square the condition number
     B = sp.diags(scale) @ c.sparse_jacobian() @ sp.diags(root)
     m, n = B.shape
     size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
@@ -343,7 +350,7 @@ def _retracted(c: CompiledMechanism, q: np.ndarray, d: np.ndarray) -> np.ndarray
 
 
 def gauss_newton(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
-    """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
+    """Run damped Gauss-Newton until closed or no longer improving. Returns (q, iterations)."""
     root, scale = np.sqrt(inverse_weights(c)), row_scales(c)
     size = largest_residual(c, t, q, v)
     g = scale * c.work.rows.value
@@ -368,7 +375,7 @@ def gauss_newton(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -
             capped += over > 1.0
             if (
                 capped > STEPS_BEFORE_WIDENING
-            ):  # it is a long way, straight on: as many steps as its length would take are not there
+            ):  # a long straight path would need more steps than allowed: take longer ones
                 wider *= 2.0
             if gain < 1e-9:
                 return q, k
@@ -380,7 +387,9 @@ def gauss_newton(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -
 
 
 def close_from_far(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
-    """Close from far: Newton from the guess, then from shaken guesses when it is caught short of closed."""
+    """Close from far away: Gauss-Newton from the guess, then from randomly perturbed guesses if it stops before
+    closing.
+    """
     w = inverse_weights(c)
     best, count = gauss_newton(c, t, q, v)
     least = largest_residual(c, t, best, v)
@@ -396,7 +405,7 @@ def close_from_far(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray)
         count += more
         gap = largest_residual(c, t, trial, v)
         if gap < 1e-9:
-            # closed from a shaken start: come back as near to the guess as the constraints allow
+            # closed from a perturbed start
             return trial, count
         if gap < least:
             best, least = trial, gap
@@ -404,7 +413,9 @@ def close_from_far(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray)
 
 
 def _body_steps_in_world(c: CompiledMechanism, q: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """The same, translations turned from each body's own axes to the world's: what they do depends on no world axes."""
+    """Return the step with translations rotated from body axes to world axes: its effect is independent of world
+    axes.
+    """
     tree, out = c.structure.tables["tree"], d.copy()
     for name, b in c.structure.place.items():
         if b >= 0:
@@ -414,29 +425,28 @@ def _body_steps_in_world(c: CompiledMechanism, q: np.ndarray, d: np.ndarray) -> 
 
 
 def closed_position_near(c: CompiledMechanism, t: float, q: np.ndarray) -> np.ndarray | None:
-    """The closed position next to q, or None if none is found; of a mechanism with the rows of its positions."""
+    """Return the closed position nearest to q, or None; for a mechanism with the rows of its positions."""
     q, _ = gauss_newton(c, t, q, np.zeros(c.structure.nv))
     return q if largest_residual(c, t, q, np.zeros(c.structure.nv)) <= CLOSED_TOLERANCE else None
 
 
-CONSISTENT_TOLERANCE = 1e-13  # part of the terms of a row that its residual may be
+CONSISTENT_TOLERANCE = 1e-13  # allowed residual of a row, relative to its terms
 CONTRADICTION_TOLERANCE = 1e-9  # the same, above which rows contradict one another
-BLOCKED_TOLERANCE = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
-STAGNATION_STEPS = 5  # steps of large mechanisms that may gain nothing: multipliers swing before they settle
-SMALLEST_TERM = 1e-200  # terms below this have no digits to compare
-DENSE_VELOCITIES = 100  # velocities up to which matrices are dense
-FREE_VELOCITY_WEIGHT = (
-    1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
-)
+BLOCKED_TOLERANCE = 1e-8  # relative singular value below which the constraints block a given velocity
+STAGNATION_STEPS = 5  # steps without progress for large mechanisms: multipliers oscillate before they converge
+SMALLEST_TERM = 1e-200  # lower bound on the terms to which residuals are compared
+DENSE_VELOCITIES = 100  # largest number of velocities for which matrices are dense
+FREE_VELOCITY_WEIGHT = 1e-10  # weight of free velocities in each iteration for large mechanisms, relative to given ones
 
 
 @dataclass
 class VelocityEquations:
-    """Rows that velocities must fulfil (hard), and those that they should (soft), at a position.
+    """Rows that velocities must satisfy (hard), and rows to be satisfied in the least-squares sense (soft), at a
+    position.
 
-    ``root``: R with R R^T the inverse mass matrix, zero for bodies whose motion is given and must not change. Soft
-    rows are weighted so that the sum of their squares is twice the kinetic energy of the difference. Hard rows times
-    ``scale`` are rates in 1/s all of them, so that what is small does not depend on the unit of length.
+    ``root``: R with R R^T the inverse mass matrix, zero for bodies whose motion is given and must not change. Soft rows
+    are weighted so that the sum of their squares is twice the kinetic energy of the difference. Hard rows times
+    ``scale`` are rates in 1/s, so that thresholds do not depend on the unit of length.
     """
 
     c: CompiledMechanism
@@ -445,7 +455,7 @@ class VelocityEquations:
     G: Any  # dense up to `DENSE_VELOCITIES` velocities
     free: np.ndarray  # 0 for velocities that are given and must not change, else 1
     scale: np.ndarray  # of the hard rows
-    held: list[GivenVelocity]  # hard, besides the constraints
+    held: list[GivenVelocity]  # further hard rows
     soft: list[GivenVelocity]
 
     @cached_property
@@ -455,7 +465,7 @@ class VelocityEquations:
 
     @cached_property
     def weights(self) -> dict[str, np.ndarray]:
-        """Of the soft rows."""
+        """Weights of the soft rows."""
         root = self.root
         return {g.name: _mass_root(_dense_array(root[g.at : g.at + g.n, g.at : g.at + g.n]), g) for g in self.soft}
 
@@ -463,7 +473,7 @@ class VelocityEquations:
     def at(
         cls, c: CompiledMechanism, q: np.ndarray, nu: np.ndarray, still: np.ndarray | None = None
     ) -> VelocityEquations:
-        """At the position last evaluated, q, for rows with the right-hand sides nu."""
+        """Create the equations at the position last evaluated, q, for rows with the right-hand sides nu."""
         told = given_velocities(c.values)
         small = c.structure.nv <= DENSE_VELOCITIES
         free = np.ones(c.structure.nv)
@@ -488,24 +498,26 @@ class VelocityEquations:
         )
 
     def _whitened_rows(self, soft: bool = True) -> tuple[Any, Any]:
-        """Both kinds of rows, by velocities whose squares are twice the kinetic energy."""
+        """Return both kinds of rows, in velocities whose squares are twice the kinetic energy."""
         return _scaled_rows(self.scale, self.G) @ self.root, _deviation_rows(
             self.c, self.q, self.soft if soft else [], self.weights
         ) @ self.root
 
     def missed(self, v: np.ndarray) -> np.ndarray:
-        """Of the hard rows."""
+        """Return the residuals of the hard rows."""
         n = len(self.nu)
         return np.r_[self.nu - self.G[:n] @ v, *(-velocity_deviation(self.c.values, g, self.q, v) for g in self.held)]
 
     def lost(self, v: np.ndarray) -> np.ndarray:
-        """Of the soft rows."""
+        """Return the residuals of the soft rows."""
         x = self.c.values
         parts = [-self.weights[g.name] @ velocity_deviation(x, g, self.q, v) for g in self.soft]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def steps(self, soft: bool = True) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """(missed, lost) -> the change of velocities that takes them away; without soft rows only what is missed."""
+        """Return the function (missed, lost) -> correction of the velocities; without soft rows it corrects ``missed``
+        only.
+        """
         A, C = self._whitened_rows(soft)
         solve = (
             _dense_least_squares(A, C) if A.shape[0] + C.shape[0] <= DENSE_ROWS else _sparse_least_squares_step(A, C)
@@ -514,7 +526,7 @@ class VelocityEquations:
 
 
 def _mass_root(R: np.ndarray, g: GivenVelocity) -> np.ndarray:
-    """Square root of the mass matrix of a body, the part that its given velocities speak of."""
+    """Return the square root of a body's mass matrix, restricted to its given velocities."""
     W = np.linalg.inv(R)
     return (
         W if g.whole else W[: g.translations, : g.translations] if g.origin else W[g.translations :, g.translations :]
@@ -522,13 +534,13 @@ def _mass_root(R: np.ndarray, g: GivenVelocity) -> np.ndarray:
 
 
 def _rate_scales(c: CompiledMechanism, g: GivenVelocity) -> np.ndarray:
-    """Factors that make the given velocities of a body rates in 1/s."""
+    """Return factors that make the given velocities of a body rates in 1/s."""
     shifts = np.full(g.translations if g.origin else 0, 1.0 / c.values.length)
     return np.r_[shifts, np.ones(g.turns if g.turning else 0)]
 
 
 def _scaled_rows(scale: np.ndarray, A: Any) -> Any:
-    """Rows of a matrix, each times a factor."""
+    """Return a matrix with each row times a factor."""
     if isinstance(A, np.ndarray):
         return scale[:, None] * A
     import scipy.sparse as sp
@@ -539,7 +551,7 @@ def _scaled_rows(scale: np.ndarray, A: Any) -> Any:
 def _deviation_rows(
     c: CompiledMechanism, q: np.ndarray, prescribed: list[GivenVelocity], weights: Mapping[str, np.ndarray]
 ):
-    """Derivatives of the (weighted) deviations of bodies by all velocities; dense up to `DENSE_VELOCITIES` of these."""
+    """Return the derivatives of (weighted) deviations of bodies by all velocities; dense up to `DENSE_VELOCITIES`."""
     i, j, x, n = [], [], [], 0
     for g in prescribed:
         T = deviation_jacobian(c.values, g, q)
@@ -564,7 +576,7 @@ def _deviation_rows(
 
 
 def _dense_least_squares(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Least x of those with |C x - s| least of those with A x = r, by singular values of A and of what it leaves of C.
+    """Return the solver for the least x of least |C x - s| among those with A x = r, by singular values.
 
     Golub and Van Loan, *Matrix Computations*, section 6.2 (least squares with equality constraints).
     """
@@ -589,7 +601,7 @@ def _dense_array(A: Any) -> np.ndarray:
 
 
 def _nonempty_columns(A: Any) -> np.ndarray:
-    """Which columns are not empty."""
+    """Return which columns are not empty."""
     if isinstance(A, np.ndarray):
         return np.asarray(A.any(axis=0))
     used = np.zeros(A.shape[1], bool)
@@ -606,12 +618,12 @@ def _stacked_rows(A: Any, B: Any) -> Any:
 
 
 def _spectral_norm(A: np.ndarray) -> float:
-    """Largest singular value."""
+    """Return the largest singular value."""
     return float(np.linalg.norm(A, 2)) if A.size else 0.0
 
 
 def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]:
-    """(basis of the row space, pseudo-inverse); singular values up to ``none`` are none."""
+    """Return (basis of the row space, pseudo-inverse); singular values up to ``none`` count as zero."""
     U, s, Vt = svd(A)
     keep = s > none
     V = Vt[keep].T
@@ -619,10 +631,10 @@ def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _sparse_least_squares_step(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """One step of the proximal method of multipliers towards the same; iterations lead there.
+    """Return one step of the proximal method of multipliers for the same problem, to be iterated.
 
-    Least e |x|^2 + |C x - s|^2 with A x = r, by [e 1, C^T, A^T; C, -1, 0; A, 0, -d], rows of unit size: the multipliers
-    that are kept from one step to the next take d out again (Rockafellar, Math. Oper. Res. 1, 1976).
+    It minimises e |x|^2 + |C x - s|^2 with A x = r, by [e 1, C^T, A^T; C, -1, 0; A, 0, -d] with rows of unit size. The
+    multipliers kept from step to step remove the effect of d (Rockafellar, Math. Oper. Res. 1, 1976).
     """
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
@@ -659,12 +671,12 @@ def consistent_velocities(
     q: np.ndarray,
     rates: Mapping[str, float],
 ) -> tuple[np.ndarray, VelocityEquations, CompiledMechanism]:
-    """Velocities at the closed position q, and what was wanted of them.
+    """Return velocities at the closed position q, and the equations that they solve.
 
     Parameters
     ----------
     model : Model
-    compiled_model : Compiled
+    compiled_model : CompiledMechanism
         In absolute coordinates.
     parameters : mapping or None
         Values in place of the model's.
@@ -676,10 +688,10 @@ def consistent_velocities(
     Returns
     -------
     v : ndarray (nv,)
-        Where rows contradict one another, those that miss them least; `contradictory_elements` tells.
-    wanted : Wanted
-    c : Compiled
-        The mechanism whose rows these are: with those of the initial rates.
+        Where rows contradict one another, those of least residual; see `contradictory_elements`.
+    wanted : VelocityEquations
+    c : CompiledMechanism
+        The mechanism of these rows, including those of the initial rates.
     """
     holds = [i for i in model.initial if i.name in rates]
     c = compile_mechanism(model, parameters=parameters, holds=holds, held={}) if holds else compiled_model
@@ -695,15 +707,15 @@ def consistent_velocities(
     v = _refined(w, v)
     if w.soft and np.abs(w.scale * w.missed(v)).max() > CONSISTENT_TOLERANCE * row_magnitude(
         w, v
-    ):  # soft rows pull at the others
+    ):  # soft rows disturb the hard ones
         v = _refined(w, v, soft=False)
     return v, w, c
 
 
 def row_magnitude(w: VelocityEquations, v: np.ndarray) -> float:
-    """What terms of the scaled hard rows may be [1/s].
+    """Return the magnitude of the terms of the scaled hard rows [1/s].
 
-    A body that spins fast about its own axis leaves rounding in them all.
+    A body that spins fast about its own axis causes rounding in all of them.
     """
     sizes = w.c.sizes
     largest = float(_scaled_rows(w.scale, _scaled_rows(sizes, abs(w.G).T).T).max()) if w.G.shape[0] else 0.0
@@ -712,7 +724,7 @@ def row_magnitude(w: VelocityEquations, v: np.ndarray) -> float:
 
 
 def _refined(w: VelocityEquations, v: np.ndarray, soft: bool = True) -> np.ndarray:
-    """Step after step, each from the residuals that the last one has left, down to rounding."""
+    """Iterate corrections from the residuals, down to rounding."""
     step = w.steps(soft)
     last = moved = np.inf
     patience = 1 if isinstance(w.G, np.ndarray) or w.G.shape[0] <= DENSE_ROWS else STAGNATION_STEPS
@@ -732,7 +744,9 @@ def _refined(w: VelocityEquations, v: np.ndarray, soft: bool = True) -> np.ndarr
 
 
 def contradictory_elements(w: VelocityEquations, v: np.ndarray) -> dict[str, float]:
-    """Elements whose rows the velocities miss, and by how much; none where they are consistent."""
+    """Return the elements whose rows are not satisfied, with the residuals; empty where the velocities are
+    consistent.
+    """
     r = np.abs(w.missed(v))
     scaled, limit = w.scale * r, CONTRADICTION_TOLERANCE * row_magnitude(w, v)
     parts = dict(w.c.structure.slices)

@@ -53,9 +53,7 @@ ParameterChanges = Annotated[list[str] | None, typer.Option("--set", help='Set a
 
 @contextmanager
 def report_errors(as_json: bool) -> Iterator[None]:
-    """Context manager that prints errors as one message to stderr (or one JSON object) and sets an exit code; no
-    traceback.
-    """
+    """Context manager that prints errors as one message to stderr (or one JSON object) and exits; without traceback."""
     try:
         yield
     except FlyballError as error:

@@ -160,8 +160,8 @@ def kinematics(
     request.write(folder / "result.csv", result.to_csv)
     request.write(folder / "result.nc", result.save)
     request.write(folder / "paths.png", lambda path: result.plot_path(*map(read_point, point or []), path=path))
-    request.print_result(result.health, {"name": request.mechanism.name, "times": len(result.t), "t": result.t[[0, -1]].tolist(),
-                              "health": result.health.as_dict()})  # fmt: skip
+    request.print_result(result.health, {"name": request.mechanism.name, "times": len(result.t),
+                              "t": result.t[[0, -1]].tolist(), "health": result.health.as_dict()})  # fmt: skip
 
 
 def set_default_end(request: Request) -> None:

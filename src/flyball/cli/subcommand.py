@@ -152,8 +152,7 @@ def command(
     overrides: Mapping[str, OptionOverride] | None = None,
     without: Sequence[str] = (),
 ) -> Callable[[Conclusion], Conclusion]:
-    """Make a subcommand of a method. The decorated function is called with the `Request`; it prints and writes the
-    result.
+    """Make a subcommand of a method. The decorated function gets the `Request`; it prints and writes the result.
 
     Parameters
     ----------

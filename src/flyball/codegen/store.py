@@ -46,8 +46,10 @@ from .procedures import PLAIN_ENTRIES
 MAX_OPERATIONS = 40_000
 """Estimated operations up to which code is generated: its compilation takes seconds, and grows faster than linearly."""
 LOOKUP_COST, LOAD_COST, OPERATION_COST, GROWTH_COST = 50e3, 3e6, 20e3, 3.5
-"""Cost of looking a mechanism up, of loading code from disk [ns]; of compiling an operation [ns], and the addition for
-each other operation: 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform.
+"""Cost [ns] of finding code in memory, of loading it from disk, of compiling an operation, and its growth.
+
+The cost of an operation grows with the number of operations. Compiling
+takes 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform.
 """
 
 

@@ -1,7 +1,7 @@
 """Python side of contact detection: allocates the workspace, calls the search, enlarges tables that are full.
 
-Bounding spheres and boxes of the shapes, and the collision classes by which pairs are filtered, are computed
-here once, in NumPy. `ContactFinder` holds contacts of two successive searches.
+Bounding spheres and boxes of the shapes, and the collision classes that filter pairs, are computed here once, in
+NumPy. `ContactFinder` holds the contacts of two successive searches.
 """
 
 from __future__ import annotations
@@ -59,15 +59,15 @@ from .tables import (
 
 
 def bounding_volumes(G: Geometry) -> np.ndarray:
-    """A sphere and a box about every bounded shape, with one middle.
+    """Bounding sphere and box of every shape, with a common centre.
 
-    A kind without a rule here gets those of the sphere that the table gives it.
+    A kind without a rule here gets those of the sphere given in the table.
 
     Returns
     -------
     ndarray (ns, 8)
-        The middle [m] in the mover's axes, the radius [m] (inf for what is unbounded), the box's half edges [m] along
-        the shape's axes. Of what is unbounded the fifth number is its greatest height along its z axis.
+        Centre [m] in the mover's axes, radius [m] (inf for unbounded shapes), half edges of the box [m] along the
+        shape's axes. For unbounded shapes the fifth number is the greatest height along the shape's z axis.
     """
     kind, par, radius = G.shape_i[:, KIND], G.shape_x[:, PAR : PAR + 3], G.shape_x[:, RADIUS]
     middle, wide = np.zeros((len(kind), 3)), ~np.isfinite(radius)
@@ -95,7 +95,7 @@ def bounding_volumes(G: Geometry) -> np.ndarray:
     return out
 
 
-_HALF_EDGES = {  # half edges from the parameters
+_HALF_EDGES = {  # half edges from the parameters of each kind
     SPHERE: lambda r, a, b: (r, r, r),
     BOX: lambda x, y, z: (x, y, z),
     ELLIPSOID: lambda x, y, z: (x, y, z),
@@ -107,16 +107,17 @@ _HALF_EDGES = {  # half edges from the parameters
 
 
 def collision_classes(G: Geometry) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Sort shapes into classes.
+    """Divide the shapes into collision classes.
 
     Returns
     -------
     kin : ndarray (ns,)
-        The class of every shape.
+        Class of every shape.
     meets : ndarray (classes, classes)
         1 where shapes of two classes may touch.
     exact : bool
-        Whether that says all; where there are too many combinations of groups, classes tell only what moves.
+        Whether classes represent all groups. If there are too many combinations of groups, classes only separate fixed
+        from movable shapes.
     """
     member, mask = G.shape_i[:, MEMBER], G.shape_i[:, MASK]
     still = (G.shape_i[:, MOVER] < 0).astype(np.int64)
@@ -134,35 +135,35 @@ def collision_classes(G: Geometry) -> tuple[np.ndarray, np.ndarray, bool]:
 PAIR_LIMIT_PER_SHAPE, PAIR_LIMIT = (
     30,
     2_000_000,
-)  # pairs for each shape and in all, above which too many are in one place
-SKIN_RATIO = 0.1  # skins, in radii
+)  # largest numbers of pairs per shape and in total; more means that too many shapes overlap
+SKIN_RATIO = 0.1  # skin thickness relative to the radius
 
 
 def no_contacts(capacity: int) -> Contacts:
-    """An empty table of contacts."""
+    """Create an empty table of contacts."""
     return Contacts(np.zeros(8, np.int64), np.full((capacity, 4), -1, np.int64), np.zeros((capacity, 10)))
 
 
 def no_movers(count: int) -> Movers:
-    """Movers at the origin, at rest."""
+    """Create movers at the origin, at rest."""
     pose = np.zeros((count, 12))
     pose[:, [3, 7, 11]] = 1.0
     return Movers(pose, np.zeros((count, 6)))
 
 
 def _power_of_two(least: int) -> int:
-    """The least power of two that is not below."""
+    """Smallest power of two (at least 16) that is not below ``least``."""
     return 1 << max(4, int(least - 1).bit_length())
 
 
 def _pair_hash_table(contacts: int) -> dict[str, np.ndarray]:
-    """A table of pairs that as many contacts never fill by more than half."""
+    """Create a hash table of pairs that this many contacts fill at most by half."""
     n = _power_of_two(2 * contacts)
     return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int64), "taken": np.zeros(n // 2, np.int64)}
 
 
 def search_workspace(G: Geometry, pairs: int, contacts: int) -> Search:
-    """The search's own tables, for this many pairs and contacts at first."""
+    """Create the tables of the search, with initial capacities for pairs and contacts."""
     ns, hold = len(G.shape_i), bounding_volumes(G)
     bounded = np.isfinite(hold[:, 3])
     kin, meets, exact = collision_classes(G)
@@ -208,7 +209,7 @@ def search_workspace(G: Geometry, pairs: int, contacts: int) -> Search:
 
 
 def narrow_phase_kernel(G: Geometry) -> Kernel:
-    """The narrow phase that shapes like these ask for; `nothing` where no pair does."""
+    """Narrow-phase kernel for the kinds of these shapes; `no_pair_contacts` if no pair needs it."""
     from .narrow_phase.dispatch import kernel_for_kinds, no_pair_contacts
 
     kind, bounded = G.shape_i[:, KIND], np.isfinite(bounding_volumes(G)[:, 3])
@@ -217,30 +218,30 @@ def narrow_phase_kernel(G: Geometry) -> Kernel:
 
 
 class ContactFinder:
-    """Contacts between shapes, step by step.
+    """Finds contacts between shapes, step by step.
 
     Parameters
     ----------
     geometry : Geometry
     margin : float
-        Gap [m] up to which shapes that do not approach have contacts.
+        Largest gap [m] of contacts between shapes that do not approach.
     ahead : float
-        Time [s] that movers go on for before the next search: what may meet within it is a contact.
+        Time [s] until the next search: shapes that may touch within it have a contact.
     skin : float
-        How far shapes may move, as a part of their radius, before their pairs are looked for again.
+        Distance that shapes may move before their pairs are listed again, relative to their radius.
 
     Attributes
     ----------
     now, before : Contacts
         Contacts of the last search and of the one before it.
     midway : Contacts
-        As large; of searches between two of these.
+        Contacts of searches between two regular ones; same capacity.
     search : Search
     address : int
-        Of the search. A compiled loop calls ``call(address, geometry, movers, before, now, search, STEP)``, in which
-        the third structure gets the contacts, and has these two change places after each call that returned DONE; at
-        another status it returns to Python, which calls `enlarge` and goes on with the tuples that are then in
-        ``now``, ``before`` and ``search``.
+        Address of the search kernel. A compiled loop calls ``call(address, geometry, movers, before, now, search,
+        STEP)``. The third structure receives the contacts; the loop exchanges it with the fourth after each call that
+        returned DONE. For another status it returns to Python, which calls `enlarge` and continues with the tuples that
+        are then in ``now``, ``before`` and ``search``.
     """
 
     def __init__(
@@ -255,18 +256,18 @@ class ContactFinder:
         self.address = search.address
 
     def find(self, movers: Movers, rebuild: bool = False) -> Contacts:
-        """Contacts at these poses, into ``now``; ``now`` becomes ``before``.
+        """Find the contacts at these poses; writes them to ``now``, and the old ``now`` becomes ``before``.
 
         Parameters
         ----------
         movers : Movers
         rebuild : bool
-            Whether to look for all pairs anew. Contacts are the same either way.
+            Whether to list all pairs anew. The contacts are the same either way.
 
         Raises
         ------
         ModelError
-            If a pose is not finite, or too many shapes are in one place.
+            If a pose is not finite, or too many shapes overlap.
         """
         self.now, self.before = self.before, self.now
         while True:
@@ -279,19 +280,19 @@ class ContactFinder:
             self.now, self.before = self.before, self.now
 
     def enlarge(self, status: int, count: np.ndarray) -> None:
-        """Make room for what a search said that it lacked; new tuples then stand in the attributes.
+        """Enlarge the table that a search reported as full; the new tuples are in the attributes.
 
         Parameters
         ----------
         status : int
-            What the search returned.
+            Status returned by the search.
         count : ndarray
-            ``count`` of the contacts that it was to fill.
+            ``count`` of the contacts that the search filled.
 
         Raises
         ------
         ModelError
-            If no room would help.
+            If a larger table would not help.
         """
         if status == NOT_FINITE:
             raise ModelError(
@@ -325,7 +326,7 @@ class ContactFinder:
         self.search = B._replace(pair=pair, seen=seen)
 
     def most_pairs(self) -> tuple[int, int]:
-        """The shape that stands in most pairs of the list, and in how many."""
+        """Shape with the most pairs in the list, and their number."""
         B = self.search
         slots = B.pair[: B.count[PAIRS_IN_LIST], :2].ravel()
         if not len(slots):
@@ -335,7 +336,7 @@ class ContactFinder:
 
 
 def _enlarged_contacts(C: Contacts, capacity: int) -> Contacts:
-    """The same contacts in a larger table."""
+    """Copy contacts to a larger table."""
     out = no_contacts(capacity)
     n = min(len(C.at), capacity)
     out.count[:] = C.count

@@ -1,7 +1,7 @@
-"""Contact matching: which contact of this step is which contact of the last step.
+"""Contact matching: finds each contact of this step among those of the last step.
 
-A hash table of pairs remembers the first contact of each pair while the list of pairs is rebuilt; within a pair,
-contacts are matched by feature, else by distance.
+A hash table of pairs stores the first contact of each pair while the list of pairs is rebuilt. Within a pair,
+contacts are matched by feature, otherwise by distance.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from .tables import FEATURE, FOUND, POINT, SHAPE_1, SHAPE_2
 
 EMPTY_PLACE = -1
 MATCHING_DISTANCE = (
-    0.3  # a contact without a feature's namesake is the nearest one, if it is nearer than this, in radii
+    0.3  # largest distance, relative to the radius, at which contacts with different features are matched
 )
 
 
 @formula
 def table_place(names, i, j, name):
-    """Where a pair stands in the table, or the empty place where it would stand.
+    """Find the place of a pair in the table, or the empty place for it.
 
-    Pairs of shapes with near numbers stand near each other, for these are mostly asked for together.
+    Pairs of shapes with similar numbers have places near each other, because they are mostly accessed together.
     """
     mask = names.shape[0] - 1
     k = (3 * i + 5 * j) & mask
@@ -31,7 +31,7 @@ def table_place(names, i, j, name):
 
 @formula
 def store_pair(B, i, j, first):
-    """Put a pair of shapes and its first contact into the table."""
+    """Store a pair of shapes and its first contact in the table."""
     name = i * B.shape_class.shape[0] + j
     k = table_place(B.names, i, j, name)
     if B.names[k] == EMPTY_PLACE:
@@ -42,7 +42,7 @@ def store_pair(B, i, j, first):
 
 @formula
 def stored_contact(B, i, j):
-    """The first contact of a pair, or -1."""
+    """First contact of a pair, or -1."""
     if B.count[TABLE_PAIRS] == 0:
         return -1
     name = i * B.shape_class.shape[0] + j
@@ -60,7 +60,7 @@ def clear_table(B):
 
 @formula
 def store_all_pairs(O, B):
-    """Put all pairs that have contacts in O into the table."""
+    """Store all pairs that have contacts in O in the table."""
     i, j = -1, -1
     for c in range(O.count[FOUND]):
         if O.at[c, SHAPE_1] != i or O.at[c, SHAPE_2] != j:
@@ -70,9 +70,9 @@ def store_all_pairs(O, B):
 
 @formula
 def matching_contact(O, pair, first, feature, point, size, used):
-    """The contact before of a pair of shapes that is the one at ``point`` now; bits of ``used`` say which are taken.
+    """Match the contact at ``point`` with one of the last search; bits of ``used`` mark those already matched.
 
-    Returns its place and its bit, or -1 and 0.
+    Returns its index and its bit, or -1 and 0.
     """
     end, best, bit = O.count[FOUND], -1, 0
     c = first

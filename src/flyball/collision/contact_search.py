@@ -2,18 +2,17 @@
 
 ::
 
-    status = enter(address, G, M, C, O, B, STEP)      # structures passed by pointer: see compiler/door.py
+    status = call(address, G, M, C, O, B, STEP)      # structures are passed by pointer: see `compiler.struct_layout`
 
-`search` brings the list of pairs (`broad_phase/pair_list`) up to date, then computes the contacts of every
-listed pair: spheres and planes directly, other pairs by the narrow phase. A pair that moves fast is advanced
-along its motion to where it first touches (conservative advancement: Mirtich 1996, "Impulse-based dynamic
-simulation of rigid body systems", 2.3): nearest points of shapes that are far apart say little about where they
-will meet.
+`search` updates the list of pairs (`broad_phase/pair_list`), then computes the contacts of every listed pair:
+spheres and planes directly, other pairs by the narrow phase. A fast pair is advanced along its motion to the place
+where it first touches (conservative advancement: Mirtich 1996, "Impulse-based dynamic simulation of rigid body
+systems", 2.3), because the nearest points of distant shapes are not those where they will touch.
 
 `C` receives the contacts for the poses in `M`; `O` holds those of the last search that returned `DONE` (the two
-change places from step to step). With status `FULL_*` or `NOT_FINITE`, `O` and the workspace stay as they were:
+are exchanged from step to step). With status `FULL_*` or `NOT_FINITE`, `O` and the workspace are unchanged:
 the caller enlarges the table (`ContactFinder.enlarge`) and calls again. ``C.count[FOUND]`` is the number of
-contacts (with FULL_CONTACTS: how many there would be; with NOT_FINITE: the mover). Poses in `M` may change
+contacts (with FULL_CONTACTS: the required number; with NOT_FINITE: the mover). Poses in `M` may change
 while the search runs; they are restored.
 """
 
@@ -99,7 +98,7 @@ from .tables import (
 
 @formula
 def write_contact(C, n, point, normal, gap, offset):
-    """Row n of the contacts, if there is one."""
+    """Write row n of the contacts, if the table has one."""
     if n < C.x.shape[0]:
         C.x[n, POINT], C.x[n, POINT + 1], C.x[n, POINT + 2] = point
         C.x[n, NORMAL], C.x[n, NORMAL + 1], C.x[n, NORMAL + 2] = normal
@@ -109,21 +108,21 @@ def write_contact(C, n, point, normal, gap, offset):
 
 @formula
 def write_contact_identity(C, n, i, j, feature, first):
-    """Say between which shapes contact n is, and which it was before."""
+    """Write the shapes and the feature of contact n, and its index in the last search."""
     if n < C.at.shape[0]:
         C.at[n, SHAPE_1], C.at[n, SHAPE_2], C.at[n, FEATURE], C.at[n, BEFORE] = i, j, feature, first
 
 
 @formula
 def approach_time(d, r, reach, u, horizon):
-    """When spheres a vector d apart that goes on with u touch, or are nearest; -1 if not within ``reach``."""
+    """Time at which spheres with relative position d and velocity u touch, or are nearest; -1 if beyond ``reach``."""
     du, u2, d2 = dot(d, u), dot(u, u), dot(d, d)
     if du >= 0.0:
         return -1.0
     time = min(horizon, -du / u2)
     if d2 + time * (2.0 * du + time * u2) >= reach * reach:
         return -1.0
-    deep = du * du - u2 * (d2 - r * r)  # discriminant: when the surfaces meet
+    deep = du * du - u2 * (d2 - r * r)  # discriminant of the time of touching
     if deep > 0.0:
         time = min(time, (d2 - r * r) / (sqrt(deep) - du))
     return time
@@ -131,11 +130,11 @@ def approach_time(d, r, reach, u, horizon):
 
 @formula
 def sphere_sphere_contact(C, B, s, t, n):
-    """The contact of two spheres, as row n: how many.
+    """Write the contact of two spheres to row n; returns the number of contacts.
 
-    Spheres whose surfaces come to within the margin in `AHEAD` seconds, as they go or if something stops one of them,
-    touch already: along the normal at which they will (first) be nearest, with the gap between their tangent planes
-    across it. A sphere that passes another has no contact with it.
+    Spheres whose surfaces come within the margin in `AHEAD` seconds, with their velocities or if one of them is
+    stopped, have a contact: along the normal at the instant at which they will (first) be nearest, with the present gap
+    between their tangent planes across it. A sphere that passes another one has no contact with it.
     """
     now, far = B.now, 0.0
     x, y, z = (
@@ -175,7 +174,7 @@ def sphere_sphere_contact(C, B, s, t, n):
         now[s, CENTRE + 1] + 0.5 * y + p * b,
         now[s, CENTRE + 2] + 0.5 * z + p * c,
     )
-    # half of what the middles are apart across the normal: each sphere is touched on the line through its own middle
+    # half the distance of the centres across the normal: each sphere is touched on the line through its own centre
     along = 0.5 * (a * x + b * y + c * z)
     apart = 0.5 * x - along * a, 0.5 * y - along * b, 0.5 * z - along * c
     if B.slot[t, SLOT_MOVER] < 0:
@@ -188,7 +187,7 @@ def sphere_sphere_contact(C, B, s, t, n):
 
 @formula
 def plane_sphere_contact(C, B, w, s, side, n):
-    """The contact of wide slot w, a plane, and slot s, a sphere; ``side`` is -1 where the sphere is shape 1."""
+    """Write the contact of wide slot w, a plane, and slot s, a sphere; ``side`` is -1 if the sphere is shape 1."""
     k = w - B.count[BOUNDED]
     q = B.wide
     x = (
@@ -211,13 +210,13 @@ def plane_sphere_contact(C, B, w, s, side, n):
     return 1
 
 
-MAX_ADVANCES = 40  # advances
-TOUCHING_GAP = 0.01  # a gap that is taken for touching, in radii of the smaller shape
+MAX_ADVANCES = 40  # iterations of conservative advancement
+TOUCHING_GAP = 0.01  # gap that counts as touching, relative to the radius of the smaller shape
 
 
 @formula
 def store_pose(M, B, row, m):
-    """Keep the pose of a mover."""
+    """Store the pose of a mover."""
     if m >= 0:
         for c in range(12):
             B.kept[row, c] = M.pose[m, c]
@@ -225,7 +224,7 @@ def store_pose(M, B, row, m):
 
 @formula
 def restore_pose(M, B, row, m):
-    """Put it back where it was."""
+    """Restore the stored pose of a mover."""
     if m >= 0:
         for c in range(12):
             M.pose[m, c] = B.kept[row, c]
@@ -233,7 +232,7 @@ def restore_pose(M, B, row, m):
 
 @formula
 def advance_pose(M, B, row, m, time):
-    """Put a mover where it will be."""
+    """Set a mover to its pose after some time."""
     if m >= 0:
         w = load3(M.twist, m, 3)
         half = 0.5 * time * norm(w)
@@ -245,7 +244,7 @@ def advance_pose(M, B, row, m, time):
 
 @formula
 def query_narrow_phase(G, M, B, s, t, reach):
-    """Contacts of the pair of slots as it stands, up to this gap, into ``room``: how many."""
+    """Find contacts of a pair of slots at the present poses, up to this gap; writes ``room``, returns their number."""
     B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH] = (
         B.slot[s, SLOT_SHAPE],
         B.slot[t, SLOT_SHAPE],
@@ -256,7 +255,7 @@ def query_narrow_phase(G, M, B, s, t, reach):
 
 @formula
 def smallest_gap(B, found):
-    """The contact with the least gap."""
+    """Index of the contact with the smallest gap."""
     best = 0
     for k in range(found):
         if B.room[k, 6] < B.room[best, 6]:
@@ -266,7 +265,7 @@ def smallest_gap(B, found):
 
 @formula
 def closing_speed(B, s, t, k):
-    """How fast two bounded shapes can come nearer along the normal of contact k."""
+    """Largest speed at which two bounded shapes can approach along the normal of contact k."""
     v = B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED]
     for c in range(3):
         v += B.room[k, 3 + c] * (B.now[s, VELOCITY + c] - B.now[t, VELOCITY + c])
@@ -275,9 +274,10 @@ def closing_speed(B, s, t, k):
 
 @formula
 def advance_to_touch(G, M, B, s, t, reach, size):
-    """Contacts where a fast pair will first touch within `AHEAD` seconds: how many, and after what time.
+    """Find contacts where a fast pair first touches within `AHEAD` seconds: their number, and the time.
 
-    They stand in ``room``, their poses in M: `restore_pose` puts these back. ``reach`` is `MARGIN` and the largest way.
+    They are in ``room``, the poses at that time in M; `restore_pose` restores these. ``reach``: `MARGIN` plus the
+    largest displacement.
     """
     a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
     ahead, time = B.real[AHEAD], 0.0
@@ -305,26 +305,26 @@ def advance_to_touch(G, M, B, s, t, reach, size):
 
 
 FAST_STEP = (
-    0.25  # what goes further than this with a step, in radii of the smaller shape, is carried on to where it touches
+    0.25  # displacement per step, relative to the radius of the smaller shape, above which a pair is advanced to touch
 )
 
 
 @formula
 def frame_velocity(B):
-    """The velocity with which all go together, if they do."""
+    """Velocity of the frame, with which all movers move if they move together."""
     return (B.real[FRAME_VELOCITY], B.real[FRAME_VELOCITY + 1], B.real[FRAME_VELOCITY + 2])
 
 
 @formula
 def largest_approach(B, s, t):
-    """What two bounded slots cover of their distance in `AHEAD` seconds at most."""
+    """Largest decrease of the distance of two bounded slots in `AHEAD` seconds."""
     u = norm(sub(load3(B.now, t, VELOCITY), load3(B.now, s, VELOCITY)))
     return B.real[AHEAD] * (u + B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED])
 
 
 @formula
 def pair_reach(B, s, t):
-    """The largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; below 0 if it cannot."""
+    """Largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; negative if it cannot."""
     now = B.now
     reach = B.real[MARGIN]
     D = frame_velocity(B)
@@ -352,9 +352,9 @@ def plane_reach(M, B, w, s):
 
 @formula
 def point_before_motion(M, p, a, b, time):
-    """A point at which movers a and b will touch after some time, before it, and half of what it is apart on them.
+    """Point at which movers a and b will touch after some time, as of now, and half its distance on the two movers.
 
-    Each mover has it where it will be from its origin when they touch.
+    Relative to each mover's origin, the point has its position at the time of touching.
     """
     v = load3(M.twist, a, 0) if a >= 0 else (0.0, 0.0, 0.0)
     u = load3(M.twist, b, 0) if b >= 0 else (0.0, 0.0, 0.0)
@@ -365,9 +365,9 @@ def point_before_motion(M, p, a, b, time):
 
 @formula
 def accept_contacts(M, C, O, B, pair, rows, time, found):
-    """Of the contacts in ``room``, after some time of motion, those that may touch: into C, as they are before it.
+    """Write the contacts in ``room``, found after some time of motion, to C if they may touch, as they are before it.
 
-    ``rows`` are the first contact of the pair before and the row that the first now goes to. Returns how many.
+    ``rows``: the pair's first contact in the last search and the next row of C. Returns their number.
     """
     many, used, ahead = 0, 0, B.real[AHEAD]
     s, t = pair
@@ -379,7 +379,7 @@ def accept_contacts(M, C, O, B, pair, rows, time, found):
         closing = dot(e, sub(v, u))
         gap = B.room[k, 6] + time * closing
         D = frame_velocity(B)
-        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # something else may stop one of them
+        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # another contact may stop one of them
             closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
         if gap < B.real[MARGIN] + ahead * max(0.0, closing):
             p, apart = point_before_motion(M, p, B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER], time)
@@ -394,7 +394,7 @@ def accept_contacts(M, C, O, B, pair, rows, time, found):
 
 @formula
 def generic_contacts(G, M, C, O, B, pair, first, n):
-    """Contacts of any pair of slots, from row n on: how many. ``first`` is the pair's first contact before."""
+    """Write the contacts of any pair of slots from row n on; returns their number. ``first``: of the last search."""
     s, t = pair
     bounded = B.count[BOUNDED]
     reach = pair_reach(B, s, t) if s < bounded and t < bounded else plane_reach(M, B, max(s, t), min(s, t))
@@ -419,7 +419,7 @@ def generic_contacts(G, M, C, O, B, pair, first, n):
 
 @formula
 def contacts_of_pairs(G, M, C, O, B):
-    """All contacts: how many there are, also where there is no room for them all."""
+    """Find all contacts; returns their number, even if the table is too small for them."""
     n, half = 0, B.count[CURRENT_HALF]
     for k in range(B.count[PAIRS_IN_LIST]):
         s, t, way = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.pair[k, 2]  # + 0: all integers of one type
@@ -441,15 +441,15 @@ def contacts_of_pairs(G, M, C, O, B):
 
 
 STEP, REBUILD, NEW_VELOCITIES, MIDWAY = range(4)
-"""Tasks: contacts at new poses, with the list of pairs mended where it must be; the same, all pairs looked for anew;
-contacts at the poses of the last search with other velocities; contacts of the known pairs within the margin, at poses
-between those of this search and of the next one. Of the last two, `O` are the contacts of the last search."""
-REBUILD_FRACTION = 0.3  # where more shapes than this part have left their envelopes, all pairs are looked for anew
+"""Tasks: contacts at new poses, with a partial update of the pair list; the same with all pairs listed anew; contacts
+at the poses of the last search with other velocities; contacts of listed pairs within the margin, at poses between
+those of this search and of the next one. For the last two, `O` are the contacts of the last search."""
+REBUILD_FRACTION = 0.3  # fraction of shapes outside their envelopes above which all pairs are listed anew
 
 
 @formula
 def rebuild_list(G, M, O, B):
-    """Look for all pairs: whether there was room."""
+    """List all pairs; returns whether the table was large enough."""
     B.count[LIST_VALID] = 0
     clear_table(B)
     store_all_pairs(O, B)
@@ -468,7 +468,7 @@ def rebuild_list(G, M, O, B):
 
 @formula
 def repair_list(G, B):
-    """Look again for pairs of what has left its envelope: 1 if that was done, 0 without room, -1 if all must."""
+    """List pairs of shapes outside their envelopes again: 1 on success, 0 if the table is full, -1 to rebuild all."""
     if B.count[MOVED_SLOTS] > REBUILD_FRACTION * B.count[BOUNDED] + 8.0:
         return -1
     B.count[LIST_VALID] = 0
@@ -485,14 +485,14 @@ def repair_list(G, B):
 
 @formula
 def add_displacement(B, displacement):
-    """Add displacements to those that were seen since the frame went on."""
+    """Add to the displacements since the frame last advanced."""
     for c in range(3):
         B.real[DISPLACEMENT + c] += displacement[c]
 
 
 @formula
 def update_list(G, M, O, B, task):
-    """Bring the list of pairs up to now: whether there was room."""
+    """Update the list of pairs; returns whether the table was large enough."""
     for c in range(3 if task != NEW_VELOCITIES else 0):
         B.real[FRAME_ORIGIN + c] += B.real[FRAME_STEP + c]
     if B.count[LIST_VALID] == 0:
@@ -519,7 +519,7 @@ def update_list(G, M, O, B, task):
 
 @formula
 def midway_contacts(G, M, C, O, B):
-    """Contacts of the listed pairs at these poses: what is remembered of the last search stays as it was."""
+    """Find contacts of the listed pairs at these poses; the data of the last search are unchanged."""
     ahead = B.real[AHEAD]
     B.real[AHEAD] = 0.0
     _, way = update_slots(G, M, B)
@@ -532,7 +532,7 @@ def midway_contacts(G, M, C, O, B):
 
 @formula
 def find_contacts(G, M, C, O, B, task):
-    """See `search`."""
+    """Find contacts; see `search`."""
     if task == MIDWAY:
         return midway_contacts(G, M, C, O, B)
     bad = set_frame(M, B)
@@ -555,7 +555,7 @@ def find_contacts(G, M, C, O, B, task):
 
 @kernel
 def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
-    """Contacts at the movers' poses: a status (DONE, FULL_*, NOT_FINITE), also in ``C.count[STATUS]``."""
+    """Find contacts at the movers' poses. Returns a status (DONE, FULL_*, NOT_FINITE), also in ``C.count[STATUS]``."""
     C.count[STATUS] = find_contacts(G, M, C, O, B, task)
     C.count[REBUILT] = B.count[REBUILDS]
     C.count[PAIRS] = B.count[PAIRS_IN_LIST]

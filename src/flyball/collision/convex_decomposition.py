@@ -1,9 +1,9 @@
 """Convex hulls of points and convex parts of closed surfaces: computed once, in NumPy, before the motion.
 
 For the decomposition, space is cut by planes into convex regions until the solid in a region is convex within
-the tolerance: its hull has no more than that of empty space in front of any piece of the surface. Candidate
-planes are those of the surface where it is concave, and three across the middle; the plane whose two hulls are
-smallest in total is taken. A solid with flat sides is decomposed exactly. Connectivity of the triangles is not
+the tolerance: the empty space of its hull in front of every piece of the surface is at most that thick. Candidate
+planes are those of the surface where it is concave, and three through the middle; the plane with the smallest total
+volume of the two hulls is chosen. A solid with flat sides is decomposed exactly. Connectivity of the triangles is not
 used, so slivers and slits do no harm.
 """
 
@@ -19,20 +19,20 @@ import numpy as np
 
 from ..errors import ModelError
 
-SMALLEST_VOLUME = 1e-9  # of the size cubed: less volume is none
+SMALLEST_VOLUME = 1e-9  # relative to the size cubed; smaller volumes count as zero
 
 
 def triangle_normals(triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (m, 3); nan for triangles without area."""
+    """Return unit normals (m, 3); nan for triangles without area."""
     n = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     with np.errstate(invalid="ignore"):
         return n / np.linalg.norm(n, axis=1, keepdims=True)
 
 
 def clip_triangles(triangles: np.ndarray, plane: np.ndarray, thick: float) -> np.ndarray:
-    """Triangles (m, 3, 3) where n . x <= c, the plane being (n, c).
+    """Clip triangles (m, 3, 3) by the half-space n . x <= c of the plane (n, c).
 
-    Of triangles within ``thick`` of the plane those remain whose solid, behind them, is on that side.
+    Triangles within ``thick`` of the plane are kept if the solid behind them is on that side.
     """
     d = triangles @ plane[:3] - plane[3]
     d[np.abs(d) <= thick] = 0.0
@@ -45,7 +45,7 @@ def clip_triangles(triangles: np.ndarray, plane: np.ndarray, thick: float) -> np
 
 
 def _clip_triangle(t: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
-    """What is below of one triangle whose corners are at heights d, as triangles (Sutherland and Hodgman 1974)."""
+    """Part of a triangle below the plane, as triangles; d: heights of its corners (Sutherland and Hodgman 1974)."""
     out = []
     for k in range(3):
         a, b, x, y = t[k], t[(k + 1) % 3], d[k], d[(k + 1) % 3]
@@ -68,7 +68,7 @@ def region_corners(planes: np.ndarray, thick: float) -> np.ndarray:
 
 
 def winding_number(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """How often a closed surface goes round each point: 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
+    """Winding number of a closed surface about each point: 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
     out = np.zeros(len(points))
     for k, x in enumerate(points):
         a, b, c = np.moveaxis(triangles - x, 1, 0)
@@ -79,16 +79,16 @@ def winding_number(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return out
 
 
-SAME_PLANE = 1e-9  # of the size: sides whose planes differ by less are one
-THINNEST = 1e-9  # of the size: thinner is no solid
-EDGE_SEARCH_VERTICES = 40  # vertices from which on the farthest one is found along the edges rather than among all
+SAME_PLANE = 1e-9  # relative to the size; sides whose planes differ by less are merged
+THINNEST = 1e-9  # relative to the size; a thinner body is no solid
+EDGE_SEARCH_VERTICES = 40  # number of vertices above which the farthest one is found along the edges
 
 
 @dataclass(frozen=True, eq=False)
 class Hull:
     """A convex polyhedron: vertices (k, 3) [m], outward unit normals (m, 3), and corners of each side.
 
-    Corners are numbers of vertices, counter-clockwise seen from outside.
+    Corners are vertex numbers, counter-clockwise seen from outside.
     """
 
     vertices: np.ndarray
@@ -97,35 +97,35 @@ class Hull:
 
     @cached_property
     def offsets(self) -> np.ndarray:
-        """Of the planes of the sides, from the origin."""
+        """Distances of the planes of the sides from the origin."""
         first = self.vertices[[s[0] for s in self.sides]]
         return np.einsum("ij,ij->i", self.normals, first)
 
     def outside(self, points: Any) -> np.ndarray:
-        """How far points are beyond the plane that they are farthest beyond; less than zero inside."""
+        """Largest signed distance of points from the planes of the sides; negative inside."""
         return np.max(np.asarray(points) @ self.normals.T - self.offsets, axis=1)
 
     @cached_property
     def volume(self) -> float:
-        """By Gauss's theorem."""
+        """Volume by the divergence theorem."""
         fans = [(s[0], a, b) for s in self.sides for a, b in itertools.pairwise(s[1:])]
         a, b, c = self.vertices[np.array(fans).T] - self.vertices.mean(axis=0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
     @property
     def rows(self) -> np.ndarray:
-        """For `Geometry.vertex`: vertices, then normals."""
+        """Rows for `Geometry.vertex`: vertices, then normals."""
         return np.concatenate([self.vertices, self.normals])
 
     def table(self, at: int) -> tuple[np.ndarray, int]:
-        """For `Geometry.face` from place ``at`` on: sides, then edges; where the edges begin, -1 if there are none."""
+        """Return data for `Geometry.face` from place ``at`` on (sides, then edges), first place of the edges or -1."""
         sides = [x for s in self.sides for x in (len(s), *s)]
         if len(self.vertices) < EDGE_SEARCH_VERTICES:
             return np.array(sides, dtype=np.int64), -1
         return np.array([*sides, *self._edges()], dtype=np.int64), at + len(sides)
 
     def _edges(self) -> list[int]:
-        """Six vertices to begin at, where the neighbours of each begin, and those, each list closed by -1."""
+        """Six start vertices, the place of each vertex's neighbours, and the neighbours, each list closed by -1."""
         near: list[set[int]] = [set() for _ in self.vertices]
         for s in self.sides:
             for a, b in zip(s, s[1:] + s[:1], strict=True):
@@ -141,12 +141,12 @@ class Hull:
 
 
 def convex_hull(points: Any) -> Hull:
-    """The convex hull of points (k, 3) [m].
+    """Compute the convex hull of points (k, 3) [m].
 
     Raises
     ------
     ModelError
-        If they are fewer than four, lie in a plane (within 1e-9 of their size), or are no finite numbers.
+        If there are fewer than four, they lie in a plane (within 1e-9 of their size), or they are not finite.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -175,7 +175,7 @@ def convex_hull(points: Any) -> Hull:
 
 
 def _merged_faces(found: Any, points: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
-    """Unit normals and corners of the sides: neighbouring triangles whose planes are the same are one."""
+    """Return unit normals and corners of the sides: neighbouring triangles in one plane are merged."""
     planes, member = found.equations, np.full(len(found.equations), -1)
     normals: list[np.ndarray] = []
     sides: list[list[int]] = []
@@ -195,7 +195,7 @@ def _merged_faces(found: Any, points: np.ndarray, new: np.ndarray) -> tuple[np.n
 
 
 def _ordered_corners(points: np.ndarray, corners: np.ndarray, n: np.ndarray) -> list[int]:
-    """The corners in order, counter-clockwise about n, those left out that are on a line between their neighbours."""
+    """Corners in counter-clockwise order about n, without those on a line between their neighbours."""
     x = points[corners]
     u = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     v = np.cross(n, u)
@@ -209,11 +209,11 @@ def _ordered_corners(points: np.ndarray, corners: np.ndarray, n: np.ndarray) -> 
     return kept
 
 
-PART_TOLERANCE = 0.02  # of the size: how far a part may reach beyond the solid
-MAX_PARTS = 64  # parts
-MAX_PLANES = 10  # planes a cut
-INSIDE_WINDING = 0.999  # winding number of what is inside, not on the surface
-ON_PLANE = 1e-7  # of the size: what counts as on a plane
+PART_TOLERANCE = 0.02  # relative to the size: largest protrusion of a part beyond the solid
+MAX_PARTS = 64  # maximum number of parts
+MAX_PLANES = 10  # candidate planes per cut
+INSIDE_WINDING = 0.999  # winding number above which a point is inside, not on the surface
+ON_PLANE = 1e-7  # relative to the size; distance within which a point is on a plane
 
 
 @dataclass(frozen=True)
@@ -223,9 +223,9 @@ class ConvexParts:
     Attributes
     ----------
     hulls : tuple of Hull
-        Neighbours share the plane that was cut along.
+        Neighbours share the cutting plane.
     beyond : float
-        How much of nothing [m] a part has in front of the solid's surface at most, square to it.
+        Largest thickness [m] of empty space in a part in front of the solid's surface, along its normal.
     """
 
     hulls: tuple[Hull, ...]
@@ -234,7 +234,7 @@ class ConvexParts:
 
 @dataclass
 class _Piece:
-    """What one region holds: triangles (m, 3, 3) of the surface, and the half-spaces n . x <= c of the region."""
+    """Contents of one region: triangles (m, 3, 3) of the surface, and the half-spaces n . x <= c of the region."""
 
     triangles: np.ndarray
     planes: np.ndarray
@@ -249,22 +249,22 @@ class _Piece:
 def convex_parts(
     vertices: np.ndarray, faces: np.ndarray, tolerance: float | None = None, most: int = MAX_PARTS
 ) -> ConvexParts:
-    """The solid inside a closed surface as convex parts.
+    """Decompose the solid inside a closed surface into convex parts.
 
     Parameters
     ----------
     vertices : (k, 3) [m]
     faces : (m, 3)
-        Triangles, counter-clockwise seen from outside. That the surface is closed is the caller's to see to.
+        Triangles, counter-clockwise seen from outside. The caller must ensure that the surface is closed.
     tolerance : float, optional
-        How far [m] a part may reach beyond the solid; a fiftieth of the solid's size if not given.
+        Largest protrusion [m] of a part beyond the solid; by default a fiftieth of the solid's size.
     most : int
-        Parts at most; where these do not suffice `Parts.beyond` is greater than the tolerance.
+        Maximum number of parts; if it is reached, `ConvexParts.beyond` may exceed the tolerance.
 
     Raises
     ------
     ModelError
-        If the tolerance is not greater than zero, or nothing solid is inside.
+        If the tolerance is not greater than zero, or the surface encloses no solid.
     """
     if tolerance is not None and not 0 < tolerance < np.inf:
         raise ModelError(f"the tolerance of convex parts must be greater than zero, got {tolerance}")
@@ -291,12 +291,12 @@ def convex_parts(
 
 
 def _update_hull(piece: _Piece, size: float, more: np.ndarray) -> None:
-    """Find the hull of a piece, and how much of nothing it has in front of each triangle of the surface."""
+    """Compute the hull of a piece, and the thickness of empty space in front of each triangle of the surface."""
     t = piece.triangles
     try:
         piece.hull = convex_hull(np.concatenate([t.reshape(-1, 3), more]))
     except ModelError:
-        return  # nothing but a skin
+        return  # no volume
     if piece.hull.volume < SMALLEST_VOLUME * size**3:
         piece.hull = None
         return
@@ -310,7 +310,7 @@ def _update_hull(piece: _Piece, size: float, more: np.ndarray) -> None:
 
 
 def _exit_distance(body: Hull, points: np.ndarray, n: np.ndarray, thick: float) -> np.ndarray:
-    """How far (m,) it is from points (m, 4, 3) out of a convex body along n (m, 3), the farthest of the four."""
+    """Distance (m,) from points (m, 4, 3) to the surface of a convex body along n (m, 3), largest of the four."""
     gap = np.maximum(body.offsets - points @ body.normals.T, 0.0)
     gap[gap < thick] = 0.0
     speed = n @ body.normals.T
@@ -320,13 +320,13 @@ def _exit_distance(body: Hull, points: np.ndarray, n: np.ndarray, thick: float) 
 
 
 def _inner_corners(piece: _Piece, solid: np.ndarray, size: float) -> np.ndarray:
-    """Corners of its region that are inside the solid."""
+    """Corners of the region that are inside the solid."""
     x = region_corners(piece.planes, ON_PLANE * size)
     return x[winding_number(x, solid) > INSIDE_WINDING]
 
 
 def _split(piece: _Piece, solid: np.ndarray, enough: float, size: float) -> list[_Piece]:
-    """The two halves along the best plane, or nothing where no plane makes both smaller."""
+    """Split a piece along the best plane; empty list if no plane makes both halves smaller."""
     best: list[tuple[_Piece, np.ndarray]] = []
     whole = piece.hull.volume if piece.hull is not None else 0.0
     least = 2 * whole
@@ -348,7 +348,7 @@ def _split(piece: _Piece, solid: np.ndarray, enough: float, size: float) -> list
 
 
 def _hull_volume(points: np.ndarray, least: float) -> float:
-    """Volume of the hull of points; 0 where there is none."""
+    """Volume of the convex hull of points; 0 if it has none."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -359,7 +359,7 @@ def _hull_volume(points: np.ndarray, least: float) -> float:
 
 
 def _cutting_planes(piece: _Piece, enough: float, size: float) -> Iterator[np.ndarray]:
-    """Planes to cut along: of triangles, that with most of nothing before it first; and three across the middle."""
+    """Candidate planes: of triangles, those with the thickest empty space first; then three through the middle."""
     n = triangle_normals(piece.triangles)
     c = np.einsum("ij,ij->i", n, piece.triangles[:, 0])
     order = np.argsort(-piece.empty, kind="stable")

@@ -1,7 +1,7 @@
-"""Kinds of shapes that may touch, and what their parameters (`PAR` of the shape table) are.
+"""Kinds of shapes that may touch, and their parameters (`PAR` of the shape table).
 
 A convex shape is a *core* and a rounding radius: all points within that radius of its core. A sphere is a point
-with a radius, a capsule a line segment with one. The core of each kind is defined in `shapes/`, one file a
+with a radius, a capsule a line segment with one. The core of each kind is defined in `shapes/`, one file per
 kind.
 
 ====  ==========  =================================================================================================
@@ -12,13 +12,13 @@ kind  name        parameters, in the shape's axes
 2     BOX         three half edges
 3     CAPSULE     radius, half length of the segment between its two centres, which lies along z
 4     CYLINDER    radius, half length along z
-5     CONE        radius, height: the middle of its base at the origin, its tip at +z
-6     HULL        rounding radius; vertices and faces stand in `Geometry.vertex` and `Geometry.face`
+5     CONE        radius, height: centre of the base at the origin, tip at +z
+6     HULL        rounding radius; vertices and faces are in `Geometry.vertex` and `Geometry.face`
 7     FIELD       a height field (`shapes/height_field.py`)
 8     POLYGON     rounding radius; a convex polygon in z = 0, counter-clockwise about z; of two vertices: a segment
 9     ELLIPSOID   three half axes
-10    HEMISPHERE  radius; its flat side in z = 0, its dome towards +z
-11    SOLID       user-defined: seven numbers for its support function, and the factor by which it is enlarged
+10    HEMISPHERE  radius; flat side in z = 0, dome towards +z
+11    SOLID       user-defined: seven numbers for its support function, and a scale factor
 ====  ==========  =================================================================================================
 
 In planar mechanisms circles are SPHERE, and polygons, segments and rectangles are POLYGON; the z axis of a

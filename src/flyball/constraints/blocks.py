@@ -87,9 +87,7 @@ class ConstraintRow(Row):
 
     @property
     def of_kind(self) -> Kind:
-        """Return its kind, with a formula called like those of the built-in rows: parameter 6 is subtracted from the
-        value.
-        """
+        """Its kind, with a formula called like those of the built-in rows: parameter 6 is subtracted from the value."""
 
         def row(par: Any, F: Any, M: Any, hint: Any, data: Any) -> Any:
             value, *wrench = type(self).row(par[:6], F, M)

@@ -35,7 +35,7 @@ def point(par, s, data):
 
 @formula
 def foot(par, F, M, hint, data):
-    """Return the parameter of the curve point nearest to M's origin by Newton's method from ``hint``: (p - c).c' = 0."""
+    """The parameter of the curve point nearest to M's origin by Newton's method from ``hint``: (p - c).c' = 0."""
     p = mtv(F[1], sub(M[0], F[0]))
     s = hint + 0.0 * p[0]
     for _ in range(PASSES):

@@ -1,5 +1,4 @@
-"""n . (d - s1 f - s2 m - k f x m) = 0 with d = p_M - p_F, n fixed in the world: one row that fixes two lines to each
-other.
+"""n . (d - s1 f - s2 m - k f x m) = 0 with d = p_M - p_F, n fixed in the world: a row that fixes two lines together.
 
 f and m are the z axes of F and M. With the angle between them fixed too (``perpendicular``), three of these keep two
 lines, one on either body, in a fixed relative position: a massless link with a hinge at either end whose axes are skew

@@ -4,9 +4,9 @@ Statics, linear models, sensitivities and implicit integration use this package.
 assembly, mobility and results. Derivatives are taken by complex steps through the compiled formulas, so a new element
 type needs no code here.
 
-Velocities that no equation sees together share a complex step: a dozen evaluations serve a thousand bodies. Reduced
-equations are the identity in coordinates chosen by pivoting, so that states have names; coefficients that are rounding
-are set to 0. With joint friction dr/dlam is -G^T and a part of its own, and multipliers drop out along other
-directions than the free motions. Places with another slope on the other side (`nonsmooth_points`) are refused by
-linear analyses; equilibria are judged on every side.
+Velocities that affect no common equation share a complex step: a dozen evaluations suffice for a thousand bodies.
+Reduced equations use coordinates chosen by pivoting, so that states have names; coefficients within rounding are set to
+0. With joint friction dr/dlam is -G^T + F, and the multipliers drop out along other directions than the free motions.
+Linear analyses refuse points where a law has different slopes on two sides (`nonsmooth_points`); the stability of
+equilibria is judged on every side.
 """

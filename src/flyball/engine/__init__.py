@@ -11,5 +11,5 @@ kinds from the registries.
 One kernel holds the right-hand side, since a second copy takes as long to compile; other loops call it by address,
 which costs nothing measurable. Loops are few for the same reason: frequent kinds of rows have their own, rare ones
 share one. Implicit methods take the residual at given accelerations (`residual`): nothing is solved in it, so complex
-steps are exact. A new tree joint is a branch in each function of `kinematics` that asks for the kind.
+steps are exact. A new kind of tree joint is a branch in each function of `kinematics` that distinguishes kinds.
 """

@@ -126,7 +126,7 @@ def alpha_steps(
 
 MAX_ROTATION_ITERATIONS = 20  # Newton iterations for one rotation
 MOMENTUM_TOLERANCE = 1e-15  # accepted residual of the rotation equation, relative to the momentum
-STALLED_TOLERANCE = 1e-12  # accepted residual, likewise, if the iteration no longer reduces it
+STALLED_TOLERANCE = 1e-12  # accepted residual, relative to the momentum, if the iteration no longer reduces it
 SMALL_ROTATION = 0.02  # rotation angle [rad] below which series are used
 
 

@@ -84,9 +84,9 @@ MODE_GUARDS = (
     G_CONE,
     G_SHARED,
 )  # guards that are positive as long as the modes are right
-GRAZING_DEPTH = 1e-12  # likewise: penetration at which an elastic stop counts as closed if nothing else has decided
-RESTING_RATE = 1e-9  # likewise, times the characteristic rate: a slower approach counts as none
-CREEP_RATE = 1e-13  # likewise: a smaller rate counts as zero
+GRAZING_DEPTH = 1e-12  # depth at which an undecided elastic stop counts as closed, in mechanism lengths or radians
+RESTING_RATE = 1e-9  # times the characteristic rate of a quantity: a slower approach counts as none
+CREEP_RATE = 1e-13  # times the characteristic rate of a quantity: a smaller rate counts as zero
 WRONG_SIDE = 1e-9  # relative to the terms of a corner function: beyond this the law is on the other side
 
 

@@ -45,11 +45,12 @@ from .kinematics import load_record, project_wrench
 from .rows import characteristic_speed, controller_column, count_measured, direction_column, wrench_on_second
 
 SLOW_SLIDING = 1e-10  # relative to the characteristic speed: slower sliding in space takes the direction of its switch
-# squared length of the stored direction at the onset of sliding in space; that direction then dominates at first
-ONSET_LENGTH = 2.0
-ONSET_SPEED = 3e-5  # likewise: at this speed the direction mostly follows the velocity; at a multiple of it, wholly
+ONSET_LENGTH = 2.0  # length of the stored direction at the onset of sliding in space; sliding follows it at first
+# relative to the characteristic speed: at this speed the direction mostly follows the velocity, at ONSET_END
+# times it wholly
+ONSET_SPEED = 3e-5
 ONSET_END = 8.0
-# likewise: backward speed that counts as reversal; at the onset the acceleration is only rounding
+# relative to the characteristic speed: backward speed that counts as reversal; at the onset it may be rounding
 REVERSAL_SPEED = 1e-11
 TURN_COSINE = 0.5  # cosine of the angle by which a direction of sliding turns before the stored direction is updated
 NO_GUARD = float("nan")
@@ -335,7 +336,7 @@ def gather_forces(S, W, f):
 
 
 MAX_LOAD_NEWTON = 40  # Newton iterations, once the slopes are known
-LOAD_TOLERANCE = 1e-12  # relative
+LOAD_TOLERANCE = 1e-12  # accepted relative change of a load
 NEGLIGIBLE_LOAD = 0.1  # relative to the largest force and LOAD_TOLERANCE: smaller changes of loads are neglected
 TRIAL_STEP = 0.05  # fraction of the way to the returned load that is taken to measure a slope
 # a step that changes the gap by less than this fraction of the expected change does not update the slopes

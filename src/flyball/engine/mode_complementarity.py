@@ -42,7 +42,7 @@ LARGE_LOAD = 1e8  # factor on a load, beside which the load-independent part of 
 
 FREE_MOTION, SOLVE_MODES, RESUME_SOLVE, STORE_RATES = range(4)  # tasks of `mode_kernel`
 RATE_ROUNDING = 1e-11  # rounding of a rate, relative to its terms
-VELOCITY_ROUNDING = 1e-14  # likewise, relative to the fastest velocity, whatever the terms
+VELOCITY_ROUNDING = 1e-14  # rounding of a rate, relative to the fastest velocity, whatever the terms
 
 
 class EngineCall(NamedTuple):

@@ -39,7 +39,7 @@ BRANCH_NUMBERS = 5  # numbers that describe the branch of a force's formula, and
 MAX_TURN = 2.0  # rotation within a step [rad] up to which the ends identify the branch
 UNBOUNDED = np.inf  # duration reported at a change of branch: no step is short enough
 DEPARTURE = 1e-3  # accepted deviation from the polynomial, relative to the law's change over the step
-LAW_ROUNDING = 1e-9  # likewise, relative to the law's size: rounding
+LAW_ROUNDING = 1e-9  # deviation that is only rounding, relative to the law's size
 # rows of StepState.seen: sensors within the step; sensors and inputs of forces and their rates, at its start and at its
 # end; values at the nodes; 1 for each law that is inspected
 INPUTS_WITHIN, NODE_VALUES, LAW_SELECTED, INSPECTION_ROWS = 0, 5, 6, 7

@@ -319,7 +319,7 @@ def remainder_schur(S, W, gamma, x, lam, rhs, semidefinite):
 
 @formula
 def beyond_rounding(W, k, residual, lam):
-    """Residual of row k beyond rounding, which its multiplier causes in x = M^-1 (f + G^T lam)."""
+    """Residual of row k, less the rounding error that its multiplier causes in x = M^-1 (f + G^T lam)."""
     return magnitude(residual) - MULTIPLIER_ROUNDING * magnitude(W.rows.diagonal[k] * lam[k])
 
 

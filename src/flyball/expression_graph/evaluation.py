@@ -14,7 +14,7 @@ from .graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, POWER, SYMBO
 
 
 def nodes_in_order(nodes: Iterable[Node]) -> list[Node]:
-    """All nodes that these are made of, themselves included, in an order of evaluation."""
+    """All nodes of expressions, including themselves, in an order of evaluation."""
     found: dict[int, Node] = {}
     to_see = [x for x in nodes if isinstance(x, Node)]
     while to_see:
@@ -26,12 +26,12 @@ def nodes_in_order(nodes: Iterable[Node]) -> list[Node]:
 
 
 def symbols_of(nodes: Iterable[Node]) -> list[Node]:
-    """Symbols in expressions, in the order in which they were made."""
+    """Symbols in expressions, in order of creation."""
     return [x for x in nodes_in_order(nodes) if x.op == SYMBOL]
 
 
 def expanded_symbol_count(nodes: Iterable[Any]) -> int:
-    """How many symbols expressions have if nothing that recurs has a name."""
+    """Number of symbols in expressions that are written out without names for common subexpressions."""
     nodes = [x for x in nodes if isinstance(x, Node)]
     size: dict[int, int] = {}
     for x in nodes_in_order(nodes):
@@ -46,7 +46,7 @@ def evaluate(nodes: Sequence[Any], values: Mapping[str, Any]) -> list[Any]:
     ----------
     nodes : sequence of Node or number
     values : mapping
-        Symbol's name -> number, complex number or array. Parameters that are left out have their own value.
+        Symbol's name -> number, complex number or array. Missing parameters have their own value.
     """
     known: dict[int, Any] = {}
     for x in nodes_in_order(nodes):
@@ -63,7 +63,7 @@ def evaluate(nodes: Sequence[Any], values: Mapping[str, Any]) -> list[Any]:
 
 
 def evaluate_array(array: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:
-    """The same for an array of expressions; an axis for arrays of values comes first."""
+    """Values of an array of expressions; an axis for arrays of values comes first."""
     flat = evaluate(list(array.ravel()), values)
     wide = np.broadcast_arrays(*flat) if flat else []
     shape = wide[0].shape if wide else ()
@@ -87,11 +87,11 @@ DERIVATIVES: dict[str, Callable[..., Any]] = {
     "sign": lambda x, f: 0.0,
     "rounded": lambda x, f: 0.0,
 }
-"""f'(x) of functions of one argument; at a kink that of the branch which gives the value, as in `scalar`."""
+"""f'(x) of functions of one argument; at a kink that of the branch that gives the value, as in `scalar`."""
 
 
 def partial_derivatives(x: Node) -> list[Any]:
-    """Derivatives of an operation by its arguments."""
+    """Partial derivatives of an operation by its arguments."""
     g, a = x.graph, x.args
     if x.op == ADD:
         return [1.0, 1.0]
@@ -108,7 +108,7 @@ def partial_derivatives(x: Node) -> list[Any]:
         square = a[0] * a[0] + a[1] * a[1]
         return [a[1] / square, -a[0] / square]
     if x.op in ("minimum", "maximum"):
-        first = a[0] - a[1] if x.op == "minimum" else a[1] - a[0]  # greater than zero: the second argument
+        first = a[0] - a[1] if x.op == "minimum" else a[1] - a[0]  # positive: the second argument is the value
         return [g.function("choose", first, 0.0, 1.0), g.function("choose", first, 1.0, 0.0)]
     if x.op == "choose":
         return [0.0, g.function("choose", a[0], 1.0, 0.0), g.function("choose", a[0], 0.0, 1.0)]

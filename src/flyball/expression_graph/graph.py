@@ -1,14 +1,13 @@
 """Expressions as the nodes of a graph: a number type that records how a value is computed.
 
-A formula evaluated on nodes leaves its operations in the graph, so that what is printed, differentiated or
-compiled is exactly what is computed with numbers. Equal expressions are one node (hash consing): common
-subexpressions are found as they are made. Nodes are numbered in the order in which they are made. The arguments
-of a node have lower numbers, so sorting by number is an order of evaluation.
+A formula evaluated on nodes records its operations in the graph, so that what is printed, differentiated or compiled is
+exactly what is computed with numbers. Equal expressions are one node (hash consing), so common subexpressions are found
+on creation. Nodes are numbered in order of creation. The arguments of a node have lower numbers, so sorting by number
+gives an order of evaluation.
 
-Only simplifications that are cheap and always correct are made at once: numbers are folded, zeros and ones
-dropped, signs and numeric factors moved to the front, equal terms of a sum joined. The others are in
-`simplification/`. Tables and Python functions of the user are nodes that call a `Function`, which the graph knows
-by name only.
+Only simplifications that are cheap and always correct are made on creation: numbers are folded, zeros and ones dropped,
+signs and numeric factors moved to the front, equal terms of a sum joined. The others are in `simplification/`. Tables
+and Python functions of the user are nodes that call a `Function`, of which the graph knows only the name.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
         scalar.minimum, scalar.maximum, scalar.choose,
     )
 }  # fmt: skip
-"""Every function that a node may be of, by its name in `math/scalar.py`."""
+"""Function names of nodes, as in `math/scalar.py`."""
 
 ODD = ("sin", "tan", "asin", "atan", "sinh", "tanh", "sign")
 EVEN = ("cos", "cosh", "absolute")
@@ -48,11 +47,11 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     POWER: scalar.power,
     **FUNCTIONS,
 }
-"""What an operation does with numbers of any kind."""
+"""Implementation of operations for numbers of any kind."""
 
 
 def decided_branch(x: Any, a: Any, b: Any) -> Any:
-    """The branch, as nodes; None where it is open: nan in a branch is a value like any other, which ends a motion."""
+    """The branch that the sign of x selects, as nodes; None if undetermined (a NaN in a branch is kept as a value)."""
     if a is b:
         return a
     if x.op == NUMBER:
@@ -63,26 +62,26 @@ def decided_branch(x: Any, a: Any, b: Any) -> Any:
 
 
 def upper_bound(x: Any) -> float:
-    """What the sign of something, and a number, are at most; inf where nobody knows."""
+    """Upper bound of a number or sign; infinity if unknown."""
     if x.op == ADD and NUMBER in (x.args[0].op, x.args[1].op):
         first, second = x.args if x.args[0].op == NUMBER else x.args[::-1]
         return float(first.value) + (1.0 if second.op == "sign" else math.inf)
     return 1.0 if x.op == "sign" else math.inf
 
 
-SPLINE_ORDERS = 4  # a cubic's value and derivatives that are not zero
+SPLINE_ORDERS = 4  # value and nonzero derivatives of a cubic
 
 
 class Function:
-    """A function that the graph knows by name only: of the user's, or a table.
+    """A function of which the graph knows only the name: a user's Python function, or a table.
 
     Parameters
     ----------
     name : str
     python : callable
-        Its value for numbers.
+        Computes its value for numbers.
     derivatives : callable, optional
-        From the index of an argument to the `Function` that is the derivative by it; raises `OpaqueFunction` if there is none.
+        Maps the index of an argument to the derivative `Function`; raises `OpaqueFunction` if there is none.
     """
 
     def __init__(
@@ -93,40 +92,40 @@ class Function:
         **details: Any,
     ) -> None:
         self.name, self.python, self._derivatives = name, python, derivatives
-        self.told = details  # what printers of a certain kind of function need
+        self.told = details  # data for printers
 
     def __call__(self, *args: Any) -> Any:
-        """Its value for numbers; element by element for arrays."""
+        """Value for numbers; element by element for arrays."""
         if any(np.ndim(x) for x in args):
             return np.frompyfunc(self.python, len(args), 1)(*args).astype(float)
         return self.python(*args)
 
     @property
     def shown(self) -> str:
-        """Its name as it is printed: of derivatives of a table with primes."""
+        """Printed name; derivatives of a table have primes."""
         return self.name + "'" * self.told.get("order", 0)
 
     def derivative(self, k: int) -> Function:
-        """By the k-th argument."""
+        """Derivative by the k-th argument."""
         if self._derivatives is None:
             raise OpaqueFunction(f"the derivative of {self.name!r} is not known: it is a Python function")
         return self._derivatives(k)
 
 
 class OpaqueFunction(Exception):
-    """Something is asked of a function that is known by name only."""
+    """An operation is not possible for a function of which only the name is known."""
 
 
 class FunctionTable:
-    """The functions of one graph, each once."""
+    """The functions of one graph, without duplicates."""
 
     def __init__(self) -> None:
         self._found: dict[Any, Any] = {}
-        self.names: dict[int, str] = {}  # of tables, by where they begin
-        self._references: list[Any] = []  # what keys stand for lives as long
+        self.names: dict[int, str] = {}  # names of tables, by start index
+        self._references: list[Any] = []  # keeps the objects alive whose identities are keys
 
     def opaque(self, python: Callable[..., Any]) -> Function:
-        """A Python function of the user's."""
+        """Function for a Python function of the user."""
         found = self._found.get(id(python))
         if found is None:
             name = getattr(python, "__name__", type(python).__name__)
@@ -135,9 +134,9 @@ class FunctionTable:
         return found
 
     def table(self, data: Any, at: int) -> tuple[Sequence[Function], list[Any]]:
-        """The spline at ``data[at]``: its value and derivatives, and which of its numbers are no plain numbers.
+        """The spline at ``data[at]``: functions for its value and derivatives, and its entries that are expressions.
 
-        These are further arguments of the functions, whose derivatives by them are not known.
+        These entries are further arguments of the functions; derivatives by them are not available.
         """
         count = int(data[at + 1].real)
         end = at + BREAKS + count + PIECE * (count + 1)
@@ -152,7 +151,7 @@ class FunctionTable:
 
 
 def spline_derivatives(data: list[float], moved: list[int], at: int, name: str) -> list[Function]:
-    """Value and derivatives of a spline whose numbers ``moved`` are given anew with each call."""
+    """Value and derivatives of a spline whose numbers ``moved`` are arguments of each call."""
 
     def of(order: int) -> Callable[..., Any]:
         def value(x: Any, *others: Any) -> Any:
@@ -186,22 +185,22 @@ def third_derivative(data: np.ndarray, x: Any) -> Any:
 
 
 class UndeterminedDecision(Exception):
-    """A formula decides by a quantity that is not known before the mechanism moves."""
+    """A formula branches on a quantity that depends on the state."""
 
 
 @dataclass(frozen=True)
 class Symbol:
-    """What a symbol stands for."""
+    """Description of a symbol."""
 
     name: str
     kind: str  # "parameter", "coordinate", "velocity", "acceleration", "multiplier", "time", "state", "input", ...
     latex: str = ""
     unit: str = ""
-    element: str = ""  # whose it is
+    element: str = ""  # owner
 
 
 class Node:
-    """One expression of a graph. Behaves like a number in every formula; see the head of this file."""
+    """One expression of a graph. Behaves like a number in every formula; see the module docstring."""
 
     __slots__ = ("args", "data", "graph", "index", "moving", "op", "partial", "value")
 
@@ -209,9 +208,9 @@ class Node:
         self, graph: Graph, op: str, args: tuple[Node, ...], data: Any, index: int, moving: bool, value: float
     ) -> None:
         self.graph, self.op, self.args, self.data, self.index = graph, op, args, data, index
-        self.moving = moving  # whether it depends on more than parameters
-        self.value = value  # with the parameters' own values; nan if it moves
-        self.partial: bool = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
+        self.moving = moving  # whether it depends on anything but parameters
+        self.value = value  # value with the parameters' own values; NaN if it is moving
+        self.partial: bool = op in PARTIAL or any(x.partial for x in args)  # whether it can lack a finite value
 
     def __add__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self, other)
@@ -291,12 +290,12 @@ class Node:
 
     @property
     def real(self) -> float:
-        """Its value with the parameters' own values, to decide by.
+        """Value with the parameters' own values, for branching.
 
         Raises
         ------
-        Undecided
-            If it depends on where the mechanism is.
+        UndeterminedDecision
+            If it depends on the state.
         """
         if self.moving:
             raise UndeterminedDecision(f"a formula decides by {self!r}, which moves; it has to use scalar.choose")
@@ -315,7 +314,7 @@ class Node:
         return self.op == NUMBER
 
     def granted(self, what: str) -> bool:
-        """Taken for granted, and noted in `Graph.granted`: "nonzero" of a pivot, "positive"."""
+        """Assume a property and record it in `Graph.granted`: "nonzero" of a pivot, "positive"."""
         if not self.moving:
             return self.value > 0.0 if what == "positive" else self.value != 0.0 and self.value == self.value
         self.graph.granted.append((self, what))
@@ -326,7 +325,7 @@ class Node:
         return self
 
     def item(self) -> Node:
-        """Itself, as of an array of one."""
+        """Itself, like an array with one entry."""
         return self
 
     def tabulated(self, data: Any, at: int) -> tuple[Node, Node, Node]:
@@ -334,15 +333,15 @@ class Node:
         return self.graph.table(data, at, self)
 
     def called(self, python: Callable[..., Any], *args: Any) -> Node:
-        """A Python function of arguments, of which this is one."""
+        """Call of a Python function with arguments that include this node."""
         return self.graph.call(self.graph.functions.opaque(python), *args)
 
     def apply(self, name: str, *args: Any) -> Node:
-        """A function of `math/scalar.py` of arguments, of which this is one: see ``scalar``."""
+        """A function of `math/scalar.py` with arguments that include this node: see ``scalar``."""
         return self.graph.function(name, *args)
 
     def __getattr__(self, name: str) -> Any:
-        """NumPy asks elements of arrays for its functions: ``np.sqrt(array)`` is ``x.sqrt()`` of each."""
+        """NumPy looks up its functions on array elements: ``np.sqrt(array)`` is ``x.sqrt()`` of each."""
         name = NUMPY_NAMES.get(name, name)
         if name in FUNCTIONS:
             return lambda: self.graph.function(name, self)
@@ -363,27 +362,28 @@ NUMPY_NAMES = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 
 
 class Graph:
-    """Nodes of which no two are equal.
+    """A graph of nodes without duplicates.
 
     Parameters
     ----------
     rounded : bool
-        Whether expressions are to round as the formulas do that make them: numeric factors are joined only where they
-        are powers of two, and y/x x is computed.
+        Whether expressions must round like the formulas that create them: numeric factors are joined only if they are
+        powers of two, and y/x x is computed.
 
     Attributes
     ----------
     strict : bool
-        Whether x/x, and x - x of what may have no finite value, stay as they are: then expressions have no value where
-        the operations that they were made by have none.
+        Whether x/x, and x - x of expressions that can lack a finite value, are kept: expressions then have no value
+        where the original operations have none.
     """
 
     def __init__(self, rounded: bool = False) -> None:
         self.rounded, self.strict = rounded, False
         self.nodes: list[Node] = []
         self.functions = FunctionTable()
-        self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
-        self.decided: set[int] = set()  # numbers of expressions in parameters that formulas have decided by
+        self.granted: list[tuple[Node, str]] = []  # properties that formulas assumed
+        # indices of expressions of parameters on which formulas have branched
+        self.decided: set[int] = set()
         self._found: dict[Any, Node] = {}
 
     def __len__(self) -> int:
@@ -402,7 +402,7 @@ class Graph:
 
     def number(self, x: Any) -> Node:
         """A plain number."""
-        x = float(x) + 0.0  # one zero
+        x = float(x) + 0.0  # no negative zero
         found = self._found.get(x) if x == x else self._found.get("nan")
         if found is None:
             found = self._new(NUMBER, (), None, False, x)
@@ -410,7 +410,7 @@ class Graph:
         return found
 
     def symbol(self, symbol: Symbol | str, value: float | None = None) -> Node:
-        """A symbol; with a value if it is known before anything moves: a parameter."""
+        """A symbol; with a value if it is a parameter."""
         if isinstance(symbol, str):
             symbol = Symbol(symbol, "coordinate" if value is None else "parameter")
         key = (SYMBOL, symbol.name)
@@ -434,7 +434,7 @@ class Graph:
     # -- operations
 
     def add(self, a: Any, b: Any) -> Node:
-        """A + b; terms that differ by a numeric factor are joined."""
+        """Sum a + b; terms that differ by a numeric factor are joined."""
         a, b = self.node(a), self.node(b)
         if a.op == NUMBER and b.op == NUMBER:
             return self.number(a.value + b.value)
@@ -450,11 +450,11 @@ class Graph:
         return self._constructed(ADD, (a, b))
 
     def subtract(self, a: Any, b: Any) -> Node:
-        """A - b."""
+        """Difference a - b."""
         return self.add(a, self.multiply(-1.0, b))
 
     def multiply(self, a: Any, b: Any) -> Node:
-        """A b, with a numeric factor in front."""
+        """Product a b, with a numeric factor in front."""
         a, b = self.node(a), self.node(b)
         if a.op == NUMBER and b.op == NUMBER:
             return self.number(a.value * b.value)
@@ -479,13 +479,13 @@ class Graph:
         return self._constructed(MULTIPLY, (a, b))
 
     def _scaled(self, x: Node) -> tuple[float, Node]:
-        """Numeric factor and the rest."""
+        """Numeric factor, and the remaining product."""
         if x.op == MULTIPLY and x.args[0].op == NUMBER and (not self.rounded or _is_power_of_two(x.args[0].value)):
             return x.args[0].value, x.args[1]
         return 1.0, x
 
     def divide(self, a: Any, b: Any) -> Node:
-        """A / b, with a numeric factor in front."""
+        """Quotient a / b, with a numeric factor in front."""
         a, b = self.node(a), self.node(b)
         if b.op == NUMBER:
             if a.op == NUMBER:
@@ -504,7 +504,7 @@ class Graph:
         return self._constructed(DIVIDE, (a, b))
 
     def power(self, a: Any, b: Any) -> Node:
-        """A ** b; whole powers by repeated squaring, as in the formulas."""
+        """Power a ** b; integer powers by repeated squaring, as in the formulas."""
         a, b = self.node(a), self.node(b)
         if a.op == NUMBER and b.op == NUMBER:
             return self.number(scalar.power(a.value, b.value))
@@ -536,11 +536,11 @@ class Graph:
         return tuple(self.call(f, x, *moved) for f in orders[:3])  # type: ignore[return-value]
 
     def call(self, function: Function, *args: Any) -> Node:
-        """A function that is known by name only."""
+        """Call of a function of which only the name is known."""
         return self._constructed(CALL, tuple(self.node(x) for x in args), function)
 
     def rebuilt(self, x: Node, args: tuple[Node, ...]) -> Node:
-        """The operation of ``x`` on other arguments, which may be of another graph than ``x``."""
+        """The operation of ``x`` with other arguments, which may belong to another graph."""
         if x.op == NUMBER:
             return self.number(x.value)
         if x.op == SYMBOL:
@@ -579,7 +579,7 @@ def _is_power_of_two(x: float) -> bool:
 
 
 def zero_objects(*shape: int) -> np.ndarray:
-    """Plain zeros among which expressions may stand."""
+    """Object array of zeros, to be filled with expressions."""
     out = np.empty(shape, object)
     out[...] = 0.0
     return out

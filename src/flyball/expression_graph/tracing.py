@@ -2,9 +2,9 @@
 
     qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma
 
-Expressions may be the numbers in the tables (filled in by the same code, run on symbols of the parameters), the
-state and the time. Loads of joints with friction are symbols of their own; what they are when the reactions are
-known is in `TracedEquations.loads`.
+The numbers in the tables (filled in by the same code, run on symbols of the parameters), the state and the time can be
+expressions. Loads of joints with friction are separate symbols; `TracedEquations.loads` are these symbols and
+`TracedEquations.returned` their values in terms of the multipliers.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from ..tables.values import values
 from .graph import Graph, Node, Symbol
 
 TRACED_TABLES = tuple(name for name in NUMBERS if name != "switch_numbers")
-"""The tables of numbers in `System` that equations of motion without switches are made of."""
+"""Number tables of `System` that equations of motion without switches use."""
 
 
 def traced_arrays(S: System) -> dict[str, np.ndarray]:
-    """Their arrays by name, always in the same order."""
+    """Arrays of `TRACED_TABLES` by name, in a fixed order."""
     return {name: x for table in TRACED_TABLES for name, x in named_arrays(getattr(S, table), table)}
 
 
 @dataclass
 class TracedEquations:
-    """Equations of motion as expressions. Arrays of objects: nodes, or numbers where nothing moves."""
+    """Equations of motion as expressions: object arrays of nodes, or of numbers where constant."""
 
     graph: Graph
     structure: Structure
-    system: System  # its tables of numbers hold objects
+    system: System  # its number tables contain objects
     work: Work  # kinematics of bodies and frames, rows, twist columns: as the engine leaves them
     t: Node
     q: list[Node]
     v: list[Node]
-    z: list[Node]  # turns, places on curves, works
+    z: list[Node]  # turn counters, curve parameters, works
     lam: list[Node]
     loads: list[Node]  # of joints with friction
     T: np.ndarray  # (nq, nv)
@@ -66,7 +66,7 @@ class TracedEquations:
 
 
 def object_tables(S: System) -> System:
-    """The tables of numbers as arrays of objects, of Python's own numbers."""
+    """The number tables as object arrays of Python numbers."""
 
     def objects(_: str, x: np.ndarray) -> np.ndarray:
         out = np.empty(x.shape, object)
@@ -86,11 +86,11 @@ def trace_equations(
     s, S : Structure, System
         A mechanism in some coordinates. The tables of numbers are `object_tables`, with expressions where wanted.
     graph : Graph, optional
-        Where expressions in the tables live.
+        Graph of the expressions in the tables.
     names : Names, optional
-        What the symbols are called.
+        Names of the symbols.
     reference : sequence, optional
-        What the coordinates are where the engine's are zero, (nq,): the equations are then in these.
+        Values of the coordinates where the engine's are zero, (nq,): the equations are then in these coordinates.
     """
     graph = Graph() if graph is None else graph
     names = names or numbered_symbols(s, len(S.rows.law))
@@ -124,7 +124,7 @@ def trace_equations(
 
 
 def tables_by_name(s: Structure, S: System) -> dict[int, str]:
-    """What tables are called, by where they begin in the table of constants; curves of joints are x and y of these."""
+    """Names of tables by start index in the table of constants; curves of joints are tables of x and y."""
     found = {at: name for name, at in s.table_at.items()}
     for k, t in enumerate(s.terms):
         if t.formula.of_kind.place:
@@ -140,7 +140,7 @@ Names = tuple[list[Symbol], list[Symbol], list[Symbol], list[Symbol], list[Symbo
 
 
 def numbered_symbols(s: Structure, rows: int) -> Names:
-    """Symbols that are called by their numbers."""
+    """Symbols named by their numbers."""
 
     def of(letter: str, kind: str, count: int) -> list[Symbol]:
         return [Symbol(f"{letter}[{k}]", kind, f"{letter}_{{{k}}}") for k in range(count)]
@@ -155,7 +155,7 @@ def numbered_symbols(s: Structure, rows: int) -> Names:
 
 
 def _kinematics(S: System, W: Work, t: Node, q: list[Node], v: list[Node], z: list[Node]) -> None:
-    """Poses, rows, velocities and bias accelerations: as `projection.update_positions` and `projection.update_velocities`."""
+    """Update poses, rows, velocities and biases as the `update_positions` and `update_velocities` of the engine do."""
     update_poses(S, W, q)
     row_values(S, W, t, z)
     update_motions(S, W, v)
@@ -163,14 +163,14 @@ def _kinematics(S: System, W: Work, t: Node, q: list[Node], v: list[Node], z: li
 
 
 def _rates(S: System, q: list[Node], v: list[Node], T: np.ndarray) -> None:
-    """Qdot = T v, column by column."""
+    """Fill T of qdot = T v, column by column."""
     for d in range(len(v)):
         one = [1.0 if k == d else 0.0 for k in range(len(v))]
         coordinate_rates(S, q, one, T[:, d])
 
 
 def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gradients of what is measured and of the rows, dense."""
+    """Gradients of the measured quantities and of the rows, dense."""
     nr = len(S.rows.law)
     dense = np.array([[0.0] * nv] * (nr + nm), object).reshape(nr + nm, nv)
     for k in range(nr + nm):
@@ -180,7 +180,7 @@ def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
-    """M, dense: of the bodies themselves where every one hangs on ground, else of composite bodies."""
+    """Dense mass matrix: from single bodies if every body is attached to ground, else from composite bodies."""
     M = np.array([[0.0] * nv] * nv, object).reshape(nv, nv)
     if len(S.mass_entries.row):
         mass_entries(S, W)
@@ -199,7 +199,7 @@ def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
 
 
 def parameter_symbols(model: Model, graph: Graph) -> dict[str, Node]:
-    """Symbols of the parameters that have a value of their own; the others are expressions of these."""
+    """Symbols of the parameters that have their own value; the others are expressions of these."""
     told = model.environment()
     own = [k for k, x in model.parameters.items() if not isinstance(x, str) or is_number_text(x)]
     return {k: graph.symbol(Symbol(k, "parameter"), told[k]) for k in own}
@@ -208,7 +208,7 @@ def parameter_symbols(model: Model, graph: Graph) -> dict[str, Node]:
 def trace_model(
     model: Model, tree: tuple[str, ...] = (), symbols: bool = True, names: Names | None = None
 ) -> TracedEquations:
-    """Trace a model in absolute coordinates, or in those of a forest.
+    """Trace a model in absolute or joint coordinates.
 
     Parameters
     ----------

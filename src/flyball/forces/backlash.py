@@ -48,7 +48,8 @@ class Backlash(Unilateral):
         Of elastic flanks.
 
     Notes
-    ----- A result contains ``value``: q_1 + (weight_2 / weight_1) q_2 + ... from the middle of the play, its ``rate``,
+    -----
+    A result contains ``value``: q_1 + (weight_2 / weight_1) q_2 + ... from the middle of the play, its ``rate``,
     the ``force`` along it (on the first coordinate), and ``closed``: 1 at the lower end, -1 at the upper, 0 between.
     """
 
@@ -112,9 +113,7 @@ class Backlash(Unilateral):
         return stop_parameters(n, -0.5 * n.gap, 0.5 * n.gap)
 
     def switches(self) -> tuple[Switch, ...]:
-        """Return one switch along the sum, which is measured from the middle of the play and thus a quantity of its
-        own.
-        """
+        """One switch along the sum, which is measured from the middle of the play and thus a quantity of its own."""
         kind = ELASTIC if self.acts() else STOP
         return (Switch(kind, along=self.coordinates, slides=self.acts(), weighted=True),)
 

@@ -24,9 +24,7 @@ KIND = 7
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Effort along the slip: -capacity times the sliding direction; ``static`` times that if static friction is
-    requested.
-    """
+    """Effort along the slip: -capacity times the sliding direction; ``static`` times that for static friction."""
     o = 0.0 * x
     capacity = choose(-laws[0], o + math.nan, laws[0])
     return -par[0] * capacity * choose(laws[2] - SLIDING, par[1] + o, laws[2] + o)

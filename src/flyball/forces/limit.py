@@ -21,8 +21,7 @@ KIND = 8
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Effort along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above the
-    upper.
+    """Effort along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above upper.
 
     A side without a stop has k = c = 0. While a side is fixed (`switch_kinds.FROZEN`), its formula is continued
     smoothly beyond the corner.
@@ -81,7 +80,8 @@ class Limit(Unilateral):
         Of elastic stops.
 
     Notes
-    ----- A result contains ``value``, ``rate``, the ``force`` along the coordinate (positive towards larger values),
+    -----
+    A result contains ``value``, ``rate``, the ``force`` along the coordinate (positive towards larger values),
     and ``closed``: 1 at the lower stop, -1 at the upper, 0 between. ``run.events`` lists each hit.
     """
 

@@ -37,7 +37,8 @@ class OneWay(Latch):
         Whether the value may increase or decrease.
 
     Notes
-    ----- A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
+    -----
+    A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
     ``closed``: 1 while it locks, 0 while it overruns.
     """
 
@@ -80,7 +81,8 @@ class Ratchet(Latch):
         From 0 (no rebound) to 1 (no energy lost).
 
     Notes
-    ----- A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
+    -----
+    A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
     ``closed``: 1 while the pawl locks, 0 otherwise.
     """
 

@@ -79,7 +79,8 @@ class Rope(CoordinateForce):
         Of an inextensible rope, from 0 (it stays taut; the default) to 1.
 
     Notes
-    ----- A result contains ``length``, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack.
+    -----
+    A result contains ``length``, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack.
     """
 
     bodies: tuple[str, ...] = field(kw_only=False)

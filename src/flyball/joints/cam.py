@@ -109,9 +109,7 @@ class Cam(Joint):
         return (centre, R), (vector(n.at, planar, f"'at' of {self.title}"), R)
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Return the roller's side of the curve, the end parameters and the radius; the engine adds the splines'
-        positions.
-        """
+        """The roller's side of the curve, the end parameters and the radius; the engine adds the splines' positions."""
         at, side, gap = self.nearest(n, F, M)
         first, last = self.extent(n)
         if last.real > first.real and self.ended(at.real, first.real, last.real):
@@ -128,9 +126,7 @@ class Cam(Joint):
         return (0.0, 0.0, 0.0, side, first, last, n.radius)
 
     def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
-        """Return the sign of a force from the profile towards the roller; it is unknown for a point on a closed
-        profile.
-        """
+        """The sign of a force from the profile towards the roller; it is unknown for a point on a closed profile."""
         if self.groove or (n.radius.real == 0.0 and not self.closed):
             return None
         return 1.0 if n.radius.real > 0.0 else 0.0
@@ -145,9 +141,7 @@ class Cam(Joint):
         return max(first - at, at - last) > near * (last - first)
 
     def end_message(self, n: SimpleNamespace, at: float) -> str:
-        """Return the message for a follower that has reached an end of the profile near this parameter; otherwise
-        nothing.
-        """
+        """The message for a follower that has reached an end of the profile near this parameter; otherwise nothing."""
         first, last = (x.real for x in self.extent(n))
         if not last > first or not self.ended(at, first, last, -END_TOLERANCE):
             return ""

@@ -53,9 +53,7 @@ class GearPair(Coupling):
         return f"{self.joint_1}.angle", f"{self.joint_2}.angle"
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """Return 1 and the ratio, with the signs for external or internal teeth, the axes' senses and the carrier's
-        side.
-        """
+        """1 and the ratio, with the signs for external or internal teeth, the axes' senses and the carrier's side."""
         carrier = self._carrier(model)
         s1, s2 = (sense(model, self, j, carrier) for j in (self.joint_1, self.joint_2))
         same = -1.0 if inner_product(axes(self.joint_1), axes(self.joint_2)).real < -1e-9 else 1.0

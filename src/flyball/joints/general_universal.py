@@ -53,9 +53,7 @@ class GeneralUniversal(Joint):
     drawn: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """Return the frames at their points: z along the axis, x in the plane of both axes, so that angles start at
-        zero.
-        """
+        """The frames at their points: z along the axis, x in the plane of both axes, so that angles start at zero."""
         if n.axes is None:
             raise ModelError(f"{self.title}: give its two axes, for instance axes=((1, 0, 0), (0, 1, 0))")
         p, r = (vector(x, planar, f"'at' of {self.title}") for x in n.at)
@@ -63,9 +61,7 @@ class GeneralUniversal(Joint):
         return (p, _with_x(a, b)), (r, _with_x(b, a))
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Return the angle between the axes, and the vector between them along f, m and f x m, in the reference
-        configuration.
-        """
+        """Return the angle between the axes, and the vector between them along f, m and f x m, as drawn."""
         f, m = F[1][:, 2], M[1][:, 2]
         across = np.cross(f, m)
         if not np.sqrt((across * across).sum()).real > PARALLEL:

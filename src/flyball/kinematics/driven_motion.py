@@ -1,8 +1,8 @@
-"""Kinematics of driven mechanisms: where everything is, and how fast, when drivers say what moves.
+"""Kinematics of driven mechanisms: positions, velocities and accelerations when drivers prescribe the motion.
 
-Positions are found at every time by Newton's method from a prediction, velocities and accelerations from the same
-rows, so nothing drifts and no step leads to another branch. Masses and forces have no influence on the motion;
-the reactions and efforts that belong to it come along.
+At every time positions are found by Newton's method from a prediction, and velocities and accelerations from the same
+rows, so nothing drifts and no step jumps to another branch. Masses and forces have no influence on the motion; the
+corresponding reactions and efforts are computed too.
 """
 
 from __future__ import annotations
@@ -34,10 +34,8 @@ from ..simulation.prescribed_motion import KNOWN_SWITCHES, refuse_passed
 from ..simulation.simulate import integrate_motion
 from ..simulation.solver_switching import CodeSelection, check_specialize
 
-SINGULAR_RATIO = (
-    1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position
-)
-LEAST_SHARE = 1e-2  # elements with less than this part of the largest share in a dependency are not named
+SINGULAR_RATIO = 1e-3  # relative smallest singular value at the end of the motion below which the position is singular
+LEAST_SHARE = 1e-2  # relative share in a dependency from which on an element is named
 MAX_NAMED = 8
 
 Times = int | Sequence[float]
@@ -45,7 +43,7 @@ Times = int | Sequence[float]
 
 @dataclass(frozen=True, kw_only=True)
 class KinematicsOptions(Options):
-    """What `Mechanism.kinematics` is asked."""
+    """Arguments of `Mechanism.kinematics`."""
 
     times: Times
     t_end: float | None
@@ -61,7 +59,7 @@ class KinematicsOptions(Options):
 
 
 def kinematics(model: Model, o: KinematicsOptions) -> Result:
-    """Positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
+    """Compute positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
     refuse_unsupported(model, "kinematics", KNOWN_SWITCHES)
     started = time.perf_counter()
     outputs, begin = requested_times(o.times, o.t_start, o.t_end)
@@ -92,12 +90,12 @@ def kinematics(model: Model, o: KinematicsOptions) -> Result:
 
 
 def requested_times(times: Times, first: float | None, last: float | None) -> tuple[np.ndarray, float]:
-    """Ascending output times, and when the motion begins.
+    """Return ascending output times, and the start time.
 
     Raises
     ------
     ModelError
-        If they do not say when.
+        If the times are incomplete or invalid.
     """
     if isinstance(times, (int, np.integer)):
         if last is None:
@@ -119,7 +117,7 @@ def requested_times(times: Times, first: float | None, last: float | None) -> tu
 
 
 def driven_assembly(model: Model, t: float, parameters: Mapping[str, float] | None) -> Assembly:
-    """The mechanism assembled where it begins, in absolute coordinates, its drivers leaving no freedom.
+    """Return the mechanism assembled at its start, in absolute coordinates, with drivers that leave no freedom.
 
     Raises
     ------
@@ -164,7 +162,8 @@ def _over_driven_error(found: Mobility) -> MobilityError:
         others = [n for n in s.elements if n not in s.drivers]
         through = f" through {', '.join(others[:MAX_NAMED])}" if others else ""
         texts.append(f"drivers {', '.join(s.drivers)} prescribe the same motion{through}" if len(s.drivers) > 1
-                     else f"driver {s.drivers[0]} prescribes what {', '.join(others[:MAX_NAMED])} do already")  # fmt: skip
+                     else f"driver {s.drivers[0]} prescribes what "
+                     f"{', '.join(others[:MAX_NAMED])} do already")  # fmt: skip
     return MobilityError(
         f"{model.name!r} is over-driven: {'; '.join(texts)}. Leave out one driver of each set; two laws that agree "
         f"only as far as they are rounded would lock the mechanism",
@@ -173,9 +172,9 @@ def _over_driven_error(found: Mobility) -> MobilityError:
 
 
 def _contradiction_error(model: Model, t: float, error: AssemblyError) -> MobilityError | SingularityError | None:
-    """The error that says which drivers contradict one another, if that is why there is no position or velocity.
+    """Return the error that names contradictory drivers, if they prevent the assembly; None otherwise.
 
-    Or that one asks for a velocity which the singular position that it starts from does not have.
+    Or that a driver prescribes a velocity which the singular start position does not allow.
     """
     if error.best is None:
         return None
@@ -187,7 +186,7 @@ def _contradiction_error(model: Model, t: float, error: AssemblyError) -> Mobili
     if any(s.contradiction == "velocity" for s in sets) and (singular := _singular_start_error(found)) is not None:
         return singular
     if not drivers or (len(drivers) == 1 and sets[0].contradiction == "position"):
-        return None  # a single driver that asks for a position out of reach
+        return None  # a single driver that prescribes a position out of reach
     return MobilityError(
         f"{model.name!r} is over-driven: drivers {', '.join(drivers)} contradict one another at t = {t:g} s: "
         f"{'; '.join(s.text for s in sets)}. Leave out one of them, or make their laws agree",
@@ -196,7 +195,7 @@ def _contradiction_error(model: Model, t: float, error: AssemblyError) -> Mobili
 
 
 def _singular_start_error(found: Mobility) -> SingularityError | None:
-    """The error for a start where drivers do not decide the motion, though next to it they do."""
+    """Return the error for a start where drivers do not determine the motion, though at nearby positions they do."""
     a = found.there.assembly
     c = a.compiled
     if not c.structure.model.drivers or not found.redundancy or not found.freedoms:
@@ -217,7 +216,8 @@ def _singular_start_error(found: Mobility) -> SingularityError | None:
     return SingularityError(
         f"{c.structure.model.name!r} begins in a singular position at t = {a.t:g} s: the constraints of "
         f"{', '.join(names[:MAX_NAMED])} are not independent there, so drivers do not decide how it goes on, "
-        f"or cannot start it ({'; '.join(m.name for m in found.motions[:MAX_NAMED])} is free). Draw it a little way beside "
+        f"or cannot start it ({'; '.join(m.name for m in found.motions[:MAX_NAMED])} is free). Draw it a little "
+        "way beside "
         f"this position, or drive another coordinate",
         where=a.t,
         elements=names,
@@ -225,7 +225,7 @@ def _singular_start_error(found: Mobility) -> SingularityError | None:
 
 
 def _lock_error(start: InitialState, error: SimulationError) -> SingularityError | None:
-    """The error that says what locks, if the motion ends at a singular position."""
+    """Return the error that names the locking elements, if the motion ends at a singular position."""
     result = error.result
     if not isinstance(result, Result) or not np.isfinite(result.final[1]).all():
         return None
@@ -251,7 +251,8 @@ def _lock_error(start: InitialState, error: SimulationError) -> SingularityError
     joints = [k for k in names if k not in drivers]
     whose = f"driver{'s' if len(drivers) > 1 else ''} {', '.join(drivers)}" if drivers else "its drivers"
     return SingularityError(
-        f"{model.name!r} locks at t = {t:.6g} s: {whose} cannot move it on through {', '.join(joints[:MAX_NAMED])}, whose "
+        f"{model.name!r} locks at t = {t:.6g} s: {whose} cannot move it on through "
+        f"{', '.join(joints[:MAX_NAMED])}, whose "
         f"constraints lose their independence there. Shorten the way of {'the driver' if drivers else 'its drivers'}, "
         f"change lengths so that it reaches farther, or drive a coordinate that goes on turning there (singularities() "
         f"follows the mechanism through such positions). The motion up to there is kept in the error's result",

@@ -1,12 +1,12 @@
-"""Inverse dynamics: what drives must give for a given motion, what joints carry, and which of it is determined.
+"""Inverse dynamics: driver efforts for a given motion, joint reactions, and which of these are determined.
 
-The same loop that follows the drivers solves M vdot = f + G^T lam for the multipliers, of which those of the
-drivers are their efforts. Where constraints depend on one another, lam is one of many solutions; `determinacy`
-finds the self-stresses at every position, and so the reactions that all solutions have in common.
+The loop that follows the drivers also solves M vdot = f + G^T lam for the multipliers; those of the drivers are their
+efforts. Where constraints are dependent, lam is one of many solutions. `determinacy` computes the self-stresses at
+every position, and thus the reactions that all solutions have in common.
 
-A mechanism that its drivers move has as many redundant constraints as it has more constraints than velocities,
-except where it is singular. Dependencies are found by inverse iteration with one sparse factor a position, in a
-compiled loop; where there are more or fewer, or the decision is close, by singular values.
+A fully driven mechanism has as many redundant constraints as it has more constraints than velocities, except at
+singular positions. Dependencies are found by inverse iteration with one sparse factorization per position, in a
+compiled loop. Where there are more or fewer, or the decision is close, singular values are used.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from ..simulation.prescribed_motion import KNOWN_SWITCHES
 from ..tables.table_definitions import PLANAR, POINT
 from .driven_motion import KinematicsOptions, kinematics, requested_times
 
-MAX_ITERATED = 64  # dependencies up to which they are found by inverse iteration
-LEAST_PART = 1e-6  # part of the largest entry of a dependency that makes a row part of it
+MAX_ITERATED = 64  # largest number of dependencies found by inverse iteration
+LEAST_PART = 1e-6  # relative entry of a dependency from which on a row is part of it
 ZERO_SINGULAR_VALUE, CLEAR_SINGULAR_VALUE = (
     1e-11,
     1e-5,
-)  # singular values, of the largest, that are surely none, and surely some
+)  # relative singular values that are certainly zero, and certainly nonzero
 
 
 class Determinacy:
@@ -52,14 +52,14 @@ class Determinacy:
     Attributes
     ----------
     count : ndarray (n,) of int
-        Constraints too many at every time.
+        Number of redundant constraints at every time.
     least : ndarray (n,)
-        The smallest singular value of the constraints that counts, of the largest: near zero near a singular position.
+        Smallest nonzero singular value of the constraints, relative to the largest: small near a singular position.
     wrenches : dict
-        Joint -> what independent self-stresses do to its reaction, (n, 6, k): force and torque / length, world axes,
-        on ``body_j`` at the joint's point there. Joints that none touches are left out.
+        Joint -> change of its reaction by independent self-stresses, (n, 6, k): force and torque / length, world axes,
+        on ``body_j`` at the joint's point there. Joints without change are left out.
     efforts : dict
-        Driver or coupling -> whether its effort is undetermined, (n,) of bool; the same.
+        Driver or coupling -> whether its effort is undetermined, (n,) of bool; those without change are left out.
     """
 
     def __init__(self, n: int) -> None:
@@ -70,7 +70,7 @@ class Determinacy:
 
 
 def determinacy(result: Result) -> Determinacy:
-    """The self-stresses at every output time of a motion."""
+    """Return the self-stresses at every output time of a motion."""
     out = Determinacy(len(result.t))
     own = compile_mechanism(result.model, parameters=result.values.told, tree=result.values.structure.tree)
     base = own if not own.structure.tree else compile_mechanism(result.model, parameters=own.values.told)
@@ -85,14 +85,16 @@ def determinacy(result: Result) -> Determinacy:
 
 @dataclass
 class _DependencySearch:
-    """Dependencies along a motion; how many, and the least singular value that counts, are noted in ``out``."""
+    """Search for dependencies along a motion; their number and the smallest nonzero singular value are stored in
+    ``out``.
+    """
 
     base: CompiledMechanism
     states: np.ndarray
     out: Determinacy
 
     def found(self) -> np.ndarray:
-        """Multipliers (n, nr, most) that act on nothing; nothing where there are fewer."""
+        """Return multipliers (n, nr, most) without effect; zero where there are fewer."""
         nr, nv = len(self.base.structure.rows), self.base.structure.nv
         lam = np.zeros((len(self.states), nr, 0))
         count, left, tried = max(nr - nv, 0), np.arange(len(self.states)), set[int]()
@@ -108,7 +110,7 @@ class _DependencySearch:
         return lam
 
     def _by_iteration(self, which: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Whether there are surely ``count``, and those; by the compiled loop."""
+        """Return where there are certainly ``count`` dependencies, and these; by the compiled loop."""
         c = self.base
         lam, sizes = dependent_rows(c.values.system, c.work, self.states[which], velocity_scales(c), count)
         largest, least, none = sizes.T
@@ -118,7 +120,9 @@ class _DependencySearch:
         return sure, lam
 
     def _by_singular_values(self, k: int, count: int) -> np.ndarray:
-        """Multipliers (nr, dependencies) at one time, by singular values; by pivots where there are about many."""
+        """Return multipliers (nr, dependencies) at one time, by singular values; by pivots where about many are
+        expected.
+        """
         c, nq, nv = self.base, self.base.structure.nq, self.base.structure.nv
         t, q, v, z = np.split(self.states[k], np.cumsum([1, nq, nv]))
         c.z = np.where(np.isnan(z), c.z, z)
@@ -137,7 +141,7 @@ class _DependencySearch:
 
 
 def _with_dependencies(lam: np.ndarray, which: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """``lam`` with the dependencies at some of the times, widened if need be."""
+    """Return ``lam`` with the dependencies at some of the times, widened if necessary."""
     more = found.shape[2] - lam.shape[2]
     lam = np.pad(lam, ((0, 0), (0, 0), (0, max(more, 0))))
     lam[which, :, : found.shape[2]] = found
@@ -145,7 +149,7 @@ def _with_dependencies(lam: np.ndarray, which: np.ndarray, found: np.ndarray) ->
 
 
 def _add_self_stresses(base: CompiledMechanism, states: np.ndarray, lam: np.ndarray, out: Determinacy) -> None:
-    """What self-stresses do to joints; efforts of drivers and couplings that they change."""
+    """Add the changes of joint reactions and of driver and coupling efforts by self-stresses."""
     s, n = base.structure, len(states)
     largest = np.abs(lam).max(axis=2)
     part = largest > LEAST_PART * largest.max(axis=1, keepdims=True)
@@ -174,10 +178,10 @@ def _add_self_stresses(base: CompiledMechanism, states: np.ndarray, lam: np.ndar
 
 
 def absolute_states(result: Result, original: CompiledMechanism, base: CompiledMechanism) -> np.ndarray:
-    """Times and states (n, 1 + ny) of a motion in the coordinates of ``base``.
+    """Return times and states (n, 1 + ny) of a motion in the coordinates of ``base``.
 
-    nan stands for turns and places on curves that ``original``, in whose coordinates the motion is, does not count; works
-    are zero.
+    nan stands for angles and curve positions that ``original``, the mechanism in the motion's coordinates, does not
+    count; works are zero.
     """
     s, n = base.structure, len(result.t)
     if base is original:
@@ -196,7 +200,7 @@ def absolute_states(result: Result, original: CompiledMechanism, base: CompiledM
 
 
 def _set_body_state(result: Result, base: CompiledMechanism, name: str, q: np.ndarray, v: np.ndarray) -> None:
-    """Coordinates and velocities of one body, where those of ``base`` stand."""
+    """Set coordinates and velocities of one body in the order of ``base``."""
     tree = base.values.system.tree
     b, at = (x.structure.place[name] for x in (result.values, base.values))
     p, R, w, u, _, _ = result.records.body(b)
@@ -213,18 +217,18 @@ def _set_body_state(result: Result, base: CompiledMechanism, name: str, q: np.nd
         v[:, v0 : v0 + 6] = np.stack([*u, *mtv(R, w)], axis=1)
 
 
-MIN_SAMPLES = 4  # samples that make a curve with two continuous derivatives
+MIN_SAMPLES = 4  # least number of samples of a curve with two continuous derivatives
 
 
 @dataclass(frozen=True, kw_only=True)
 class InverseDynamicsOptions(KinematicsOptions):
-    """What `Mechanism.inverse_dynamics` is asked."""
+    """Arguments of `Mechanism.inverse_dynamics`."""
 
     motion: Mapping[str, Any] | None
 
 
 def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
-    """Forces and torques of drives, and reactions, for a given motion: see `Mechanism.inverse_dynamics`."""
+    """Compute driver efforts and reactions for a given motion: see `Mechanism.inverse_dynamics`."""
     refuse_unsupported(model, "inverse_dynamics", KNOWN_SWITCHES)
     model = model.copy() if o.motion else model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
@@ -243,7 +247,7 @@ def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics
 
 
 def _add_driver(model: Model, label: str, motion: Any, times: np.ndarray, labels: dict[str, str]) -> float:
-    """Add the driver of one coordinate; returns when what drives it begins."""
+    """Add the driver of one coordinate; return the start time of its samples."""
     coordinate = _driven_coordinate(model, label)
     name = f"{label.replace('.', ' ')} drive"
     law, first = motion, -np.inf
@@ -259,7 +263,7 @@ def _add_driver(model: Model, label: str, motion: Any, times: np.ndarray, labels
 
 
 def _driven_coordinate(model: Model, label: str) -> str:
-    """The coordinate that a name of the motion means."""
+    """Return the coordinate that a name in the motion refers to."""
     if "." in label:
         return label
     if not isinstance(e := model.find(label), Sensor):
@@ -278,7 +282,7 @@ def _driven_coordinate(model: Model, label: str) -> str:
 
 
 def _samples(label: str, motion: Any, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of samples, checked."""
+    """Return checked times and values of samples."""
     try:
         pair = isinstance(motion, tuple) and len(motion) == 2 and np.ndim(motion[0]) == 1
         t, x = (np.asarray(part, float) for part in (motion if pair else (times, motion)))
@@ -302,16 +306,16 @@ def _samples(label: str, motion: Any, times: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _extended_samples(t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same spline with a point more at either end, so that the ends of the samples are inside it."""
+    """Return the same spline with one more point at either end, so that the ends of the samples are inside it."""
     from scipy.interpolate import CubicSpline
 
-    curve = CubicSpline(t, x)  # not-a-knot: its first and last pieces go on as they are
+    curve = CubicSpline(t, x)  # not-a-knot: its first and last polynomials are extrapolated
     more = np.r_[2 * t[0] - t[1], t, 2 * t[-1] - t[-2]]
     return more, curve(more)
 
 
 def _drive(result: Result, driver: Driver) -> Drive:
-    """What a driver does and how fast its coordinate moves."""
+    """Return the effort of a driver and the rate of its coordinate."""
     model = result.model
     owner, what = model.coordinate(driver.coordinate, driver)
     view = result[owner.name]

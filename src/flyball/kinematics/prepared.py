@@ -33,28 +33,28 @@ from ..tables.structure_definition import velocity_names
 
 
 class Prepared:
-    """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
+    """A mechanism in one kind of coordinates, at one set of parameter values. It is immutable.
 
-    Threads may share it. Answers depend on nothing but the arguments. Whole turns of angles count, as far as q knows
-    them: of tree joints that turn about one axis, and of everything in the plane. In space other angles (all of them in
-    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's.
-    Followers of cams are where the profile is nearest.
+    Threads may share it. Results depend on the arguments only. Whole turns of angles count as far as q contains them:
+    for tree joints that rotate about one axis, and for everything in the plane. In space other angles (all of them in
+    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's. Cam
+    followers are where the profile is nearest.
 
     Attributes
     ----------
     model : Mechanism
-        As it was when it was prepared; additions to the original are not seen.
+        As it was when it was prepared; later additions to the original have no effect.
     coordinates : str
-        Which they are, and why.
+        The kind of coordinates, and why.
     q, v : ndarray (nq,), (nv,)
-        The start: as described and assembled at t = 0. A spatial body that hangs freely has x, y, z of its centre of
-        mass and a quaternion (scalar first) in q, the velocity of that point in world axes and its angular velocity
-        in its own axes in v; a planar one x, y, angle. Tree joints have their coordinates, spherical ones a quaternion
-        and the angular velocity in the moved axes.
+        The start: as described and assembled at t = 0. A free spatial body has x, y, z of its centre of mass and a
+        quaternion (scalar first) in q, and the velocity of that point in world axes and its angular velocity in body
+        axes in v; a planar one x, y, angle. Tree joints have their coordinates, spherical ones a quaternion and the
+        angular velocity in the moved axes.
     names : tuple of str
-        What each velocity is the rate of, (nv,).
+        The coordinate whose rate each velocity is, (nv,).
     rows : tuple of str
-        The element and what it restrains, for each constraint row, (nr,).
+        Element and restrained quantity of each constraint row, (nr,).
     """
 
     model: Any
@@ -77,7 +77,7 @@ class Prepared:
         vars(self).update(_start=start.assembly.again(), _here=threading.local())
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refused."""
+        """Raise an error: it is immutable."""
         raise ModelError(f"{name!r} cannot be set: what is prepared does not change; prepare the changed mechanism")
 
     @property
@@ -86,7 +86,7 @@ class Prepared:
         return self._start.compiled.values.told
 
     def simulate(self, t_end: float | str, **options: Any) -> Result:
-        """The same as `Mechanism.simulate` in these coordinates, with these values of the parameters.
+        """Simulate as `Mechanism.simulate` in these coordinates, with these parameter values.
 
         Parameters
         ----------
@@ -103,11 +103,11 @@ class Prepared:
 
     @property
     def parameters_given(self) -> dict[str, Any]:
-        """Values that it was prepared with in place of the model's."""
+        """Parameter values with which it was prepared, in place of the model's."""
         return dict(self._start.compiled.parameters)
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
-        """M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
+        """Return M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
         c = self._scratch("bare")
         self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
         M = np.zeros((len(self.v), len(self.v)))
@@ -117,9 +117,9 @@ class Prepared:
         return M
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Vdot, (nv,) [m/s^2, rad/s^2], with the constraints' reactions.
+        """Return vdot, (nv,) [m/s^2, rad/s^2], including constraint reactions.
 
-        Coordinates that drivers prescribe are taken where these want them at t, also in `multipliers`, `efforts` and
+        Coordinates that drivers prescribe take their prescribed values at t, also in `multipliers`, `efforts` and
         `forces`.
 
         Raises
@@ -130,45 +130,47 @@ class Prepared:
         return self._moving(t, q, v).work.velocities.solved.copy()
 
     def multipliers(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Lam, (nr,): reactions are G^T lam."""
+        """Return lam, (nr,): reactions are G^T lam."""
         return self._moving(t, q, v).work.rows.multiplier.copy()
 
     def efforts(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """What drivers give along the coordinates that they prescribe, (nv,) [N, N m]; 0 for the others."""
+        """Return the driver efforts along the coordinates that they prescribe, (nv,) [N, N m]; 0 for the others."""
         return self._moving(t, q, v).work.velocities.effort.copy()
 
     def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """F, (nv,) [N, N m]: all forces but reactions, gyroscopic ones included."""
+        """Return f, (nv,) [N, N m]: all forces but reactions, gyroscopic ones included."""
         return self._moving(t, q, v).work.velocities.applied.copy()
 
     def jacobian(self, t: float, q: np.ndarray) -> np.ndarray:
-        """G, (nr, nv): derivatives of the constraint rows along the velocities."""
+        """Return G, (nr, nv): derivatives of the constraint rows along the velocities."""
         return self._at(self._scratch(), t, q, np.zeros(len(self.v))).jacobian()
 
     def constraint(self, t: float, q: np.ndarray) -> np.ndarray:
-        """How far the constraint rows are from closed, g, (nr,) [m, rad, 1]; 0 for those of velocities only."""
+        """Return the constraint residuals g, (nr,) [m, rad, 1]; 0 for rows of velocities only."""
         return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.rows.value.copy()
 
     def constraint_rate(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """G v less what drivers ask for, (nr,) [m/s, rad/s]."""
+        """Return G v less the rates that drivers prescribe, (nr,) [m/s, rad/s]."""
         c = self._at(self._scratch(), t, q, v)
         return c.jacobian() @ np.asarray(v, float) - c.work.rows.nu
 
     def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Qdot, (nq,): v, where coordinates are no quaternions."""
+        """Return qdot, (nq,): v, except for quaternions."""
         q, v = self._state(q, v)
         out = np.zeros(len(q))
         coordinate_rates(self._start.compiled.values.system, q, v, out)
         return out
 
     def step(self, q: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Q moved by the finite step d (nv,) along the velocities, (nq,); quaternions keep their length."""
+        """Return q moved by the finite step d (nv,) along the velocities, (nq,); quaternions keep their length."""
         q, d = self._state(q, d)
         retract(self._start.compiled.values.system, q, d)
         return q
 
     def pose(self, name: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3); world axes."""
+        """Return the origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3);
+        world axes.
+        """
         c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
         b, offset, turn = self._carried(c, name)
         if b < 0:
@@ -177,7 +179,9 @@ class Prepared:
         return p + R @ offset, R @ turn
 
     def frame_jacobian(self, name: str, q: np.ndarray) -> np.ndarray:
-        """Derivatives of velocity (rows 0 to 2) and angular velocity (3 to 5) of a frame, world axes, (6, nv)."""
+        """Return the derivatives of a frame's velocity (rows 0 to 2) and angular velocity (3 to 5), world axes, (6,
+        nv).
+        """
         c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
         S, W = c.values.system, c.work
         b, offset, _ = self._carried(c, name)
@@ -198,7 +202,7 @@ class Prepared:
         vars(self).update(state, _here=threading.local())
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people."""
+        """Return labelled lines of text."""
         s = self._start.compiled.structure
         return [
             ("prepared", f"{self.model.name}, {s.nv} velocities, {len(s.rows)} constraint rows"),
@@ -207,17 +211,17 @@ class Prepared:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data: the start, names of velocities and rows, values of the parameters."""
+        """Return plain data: the start, names of velocities and rows, parameter values."""
         start = {"q": self.q.tolist(), "v": self.v.tolist()}
         names = {"velocities": list(self.names), "rows": list(self.rows)}
         return {"name": self.model.name, "coordinates": self.coordinates, "parameters": self.parameters} | names | start
 
     def __repr__(self) -> str:
-        """The lines."""
+        """Return the lines as text."""
         return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
 
     def _scratch(self, which: str = "moving") -> CompiledMechanism:
-        """This thread's own scratch, with the turns of the start."""
+        """Return this thread's own workspace, with the angles of the start."""
         found: CompiledMechanism | None = getattr(self._here, which, None)
         if found is None:
             found = self._start.compiled.again() if which == "moving" else self._bare()
@@ -227,11 +231,14 @@ class Prepared:
         return found
 
     def _bare(self) -> CompiledMechanism:
-        """Bodies and joints alone, with a mass matrix; drivers would put what they prescribe where they want it."""
+        """Return bodies and joints alone, with a mass matrix; drivers would override the coordinates that they
+        prescribe.
+        """
         c = self._start.compiled
         bare = self.model.copy()
         bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
-        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)  # told to spin, a body is no point mass without what turns it
+        # a body with a given angular velocity does not become a point mass when forces and drivers are removed
+        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)
         rigid = {name for name, why in point_mass_obstacles(self.model).items() if why}
         bare.bodies = [replace(b, angular_velocity=still) if b.name in rigid else b for b in bare.bodies]
         return compile_mechanism(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
@@ -258,12 +265,12 @@ class Prepared:
         return c
 
     def _set_turn_counts(self, c: CompiledMechanism, t: float, q: np.ndarray) -> None:
-        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them."""
+        """Set the angle states from the coordinates: whole turns since the start count where q contains them."""
         S = c.values.system
         if not len(S.angles.F):
             return
         way = q - self.q
-        for b in np.flatnonzero(S.tree.law >= 0).tolist():  # a driver says where these are
+        for b in np.flatnonzero(S.tree.law >= 0).tolist():  # prescribed by a driver
             law = evaluate_jet(S.code, S.const, int(S.tree.law[b]), c.work.stack, t, c.work.sensed, BY_TIME)
             way[S.tree.q[b]] = law[0] - S.bodies.offset[b] - self.q[S.tree.q[b]]
         at = S.angles.state
@@ -271,10 +278,10 @@ class Prepared:
 
     @property
     def _by_coordinates(self) -> np.ndarray:
-        """How turned angles follow the coordinates, (angles, nq); found when first asked for.
+        """Derivatives of the angle states by the coordinates, (angles, nq); computed on first access.
 
-        Angles that are coordinates of tree joints are these; in the plane all others follow from how far bodies have
-        turned. In space the pose of a body that hangs freely is the same after a whole turn.
+        Angles that are tree-joint coordinates equal these; in the plane all others follow from the rotations of bodies.
+        In space the pose of a free body is the same after a whole turn.
         """
         if "_turning" not in vars(self):
             c = self._start.compiled.again()
@@ -284,7 +291,7 @@ class Prepared:
         return vars(self)["_turning"]  # type: ignore[no-any-return]
 
     def _turned(self, c: CompiledMechanism, q: np.ndarray) -> np.ndarray:
-        """Turned angles as far as the coordinates tell them, (angles,); their differences are what counts."""
+        """Return the angles as far as the coordinates determine them, (angles,); only differences are meaningful."""
         s, S = c.structure, c.values.system
         if not s.model.planar:
             known = {s.state_at[name]: angle for name, angle in c.turned(q).items() if name in s.state_at}
@@ -297,7 +304,7 @@ class Prepared:
         )
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Copies as floats, refused if there are more or less than there must be."""
+        """Return copies as floats; refuse numbers that are not real and finite, and wrong shapes."""
         out = []
         for name, x, known in (("q", q, self.q), ("v", v, self.v)):
             found = np.array(x)
@@ -314,7 +321,7 @@ class Prepared:
         return out[0], out[1]
 
     def _carried(self, c: CompiledMechanism, name: str) -> tuple[int, np.ndarray, np.ndarray]:
-        """Row of the body that carries a frame (-1: ground), its origin and axes seen from there."""
+        """Return the row of the body that carries a frame (-1: ground), and its origin and axes in the body."""
         if name == GROUND:
             return -1, np.zeros(3), np.eye(3)
         e = self.model[name]
@@ -328,13 +335,13 @@ class Prepared:
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareOptions(Options):
-    """What `Mechanism.prepare` is asked."""
+    """Arguments of `Mechanism.prepare`."""
 
     coordinates: str
     parameters: Mapping[str, float] | None
 
 
 def prepare(model: Model, o: PrepareOptions) -> Prepared:
-    """A mechanism made ready: see `Mechanism.prepare`."""
+    """Return the prepared mechanism: see `Mechanism.prepare`."""
     refuse_unsupported(model, "prepare", SLIDING)
     return Prepared(find_initial_state(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

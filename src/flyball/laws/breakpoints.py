@@ -31,7 +31,7 @@ from .interval_evaluation import (
 MAX_INTERVALS = 60000  # intervals processed together
 SUBDIVISION = 4  # parts that an interval is divided into
 THIN_CROSSING = 1e-12  # fraction of the span: an interval that is not divided
-THIN_TOUCH = 1e-9  # likewise, for an interval in which a level may be touched
+THIN_TOUCH = 1e-9  # fraction of the span: an interval that is not divided where a level may be touched
 ROUNDOFF_FACTOR = 8.0 * ROUNDING  # relative to the operands: rounding error of a difference
 SLOPE_FACTOR = 100.0  # a range is conclusive if it exceeds its rounding error by this factor
 END_MARGIN = 1024.0  # units in the last place from an end of the span at which a level reached at the end is reported

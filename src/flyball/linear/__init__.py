@@ -1,12 +1,11 @@
 """Linear equations of motion: operating point, linear models, modes, root loci.
 
-`linearize`, `modes` and `root_locus` are what a user asks. A linearisation takes an `operating_point`, derivatives
-and reduced equations from `derivatives`, and the copy of the model of `statics.controller_states` where controllers
-have states. `descriptor` leaves the constraints in: for mechanisms with many velocities at rest, sparse, in absolute
-coordinates. Eigenvalues on a root locus are matched from value to value; stability changes at zeros of functions that
-are smooth where eigenvalues are not.
+Users call `linearize`, `modes` and `root_locus`. A linearisation uses an `operating_point`, derivatives and reduced
+equations from `derivatives`, and, with controllers, the auxiliary model of `statics.controller_states`. `descriptor`
+keeps the constraints: it is sparse, in absolute coordinates, for large mechanisms at rest. Eigenvalues of a root locus
+are matched from value to value. Stability changes are zeros of functions that are smooth where eigenvalues are not.
 
 Imports the model, tables, engine, numerics, results, `assembly`, `mobility`, `derivatives`, `statics` and the initial
-state of `simulation`; SciPy only within functions. A new question about small motions is one module that takes
-`linearize.equations_without_inputs` and makes a class of `results` of it.
+state of `simulation`; SciPy only within functions. A new analysis of small motions is one module that calls
+`linearize.equations_without_inputs` and returns a class of `results`.
 """

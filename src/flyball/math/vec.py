@@ -204,7 +204,7 @@ def matrix_product(A: Any, B: Any) -> np.ndarray:
     if "c" not in (A.dtype.kind, B.dtype.kind):
         return _product_terms(A, B)
     real = _product_terms(A.real, B.real) - (_product_terms(A.imag, B.imag) + 0.0)  # no zero changes its sign
-    out = np.empty(real.shape, complex)  # NumPy's complex multiplication depends on memory alignment
+    out = np.empty(real.shape, complex)  # NumPy's complex multiplication rounds by where arrays are in memory
     out.real, out.imag = real, _product_terms(A.real, B.imag) + _product_terms(A.imag, B.real) + 0.0
     return out
 

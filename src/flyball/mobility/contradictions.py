@@ -1,4 +1,4 @@
-"""Why constraints and prescribed rates contradict one another: which elements, and by which rank condition."""
+"""Why constraints and prescribed rates contradict one another: the elements, and the rank condition."""
 
 from __future__ import annotations
 
@@ -16,48 +16,48 @@ from ..numerics.rank import rank as rank_of
 from .mobility import free_motions, nearby_positions
 from .null_spaces import DENSE, scaled_jacobian
 
-LEAST_SHARE = 1e-6  # part of the largest share in a contradiction below which an element has none
-LEAST_MOTION = 1e-6  # part of its own gradient by which what is free moves a coordinate, below which it does not
-PARALLEL_TOLERANCE = 1e-6  # [rad] between axes that are parallel
+LEAST_SHARE = 1e-6  # relative share in a contradiction below which an element does not take part
+LEAST_MOTION = 1e-6  # rate of a coordinate in a free motion, relative to its gradient, that counts as zero
+PARALLEL_TOLERANCE = 1e-6  # largest angle between parallel axes [rad]
 MAX_NAMED = 8
 
 
 @dataclass(frozen=True)
 class ContradictionCase:
-    """Constraints G x = right that contradict one another, at a state."""
+    """Contradictory constraints G x = right at a state."""
 
     c: CompiledMechanism
     t: float
     q: np.ndarray
     v: np.ndarray
     right: np.ndarray
-    per_time: str  # what x is counted in: "/s" or "/s^2"
+    per_time: str  # unit of x per unit of coordinate: "/s" or "/s^2"
 
     def rows(self, names: list[str]) -> np.ndarray:
-        """Whether rows are those of the elements."""
+        """Return which rows belong to the elements."""
         out = np.zeros(len(self.right), bool)
         for name in names:
             out[self.c.structure.slices[name]] = True
         return out
 
     def unit(self, name: str) -> str:
-        """Of the rates of an element's first row."""
+        """Return the unit of the rate of an element's first row."""
         return ("m" if self.c.metric[self.c.structure.slices[name].start] else "rad") + self.per_time
 
 
 def explain_contradiction(
     c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray, right: np.ndarray, per: str = "/s"
 ) -> str:
-    """Why G x = right has no solution at a state, and what to do; "" where that is not known.
+    """Explain why G x = right has no solution at a state, and what to do; "" where that is not known.
 
     Parameters
     ----------
-    c : Compiled
-        In absolute coordinates; its rows may hold initial rates.
+    c : CompiledMechanism
+        In absolute coordinates; it may have rows of initial rates.
     t, q, v
         The state.
     right : ndarray (nr,)
-        What rows ask for.
+        Right-hand sides of the rows.
     per : str
         ``"/s"`` for velocities, ``"/s^2"`` for accelerations.
     """
@@ -98,7 +98,7 @@ def _prescribed_coordinate(case: ContradictionCase, name: str) -> str:
 
 
 def _several_prescribe(case: ContradictionCase, prescribing: list[str], names: list[str]) -> str:
-    """Several ask for the same freedom: what each asks for, and what the others make of it."""
+    """Explain that several elements prescribe the same freedom, with the prescribed and the resulting rates."""
     G = case.c.jacobian()
     said = []
     for name in prescribing[:MAX_NAMED]:
@@ -113,7 +113,7 @@ def _several_prescribe(case: ContradictionCase, prescribing: list[str], names: l
 
 
 def _nothing_free(case: ContradictionCase, name: str, holding: list[str], rows: int, G: Any) -> str:
-    """No freedom is left without what asks: a structure, or one whose freedom its dimensions do not leave."""
+    """Explain that the other constraints leave no freedom: it is a structure, or needs special dimensions."""
     counted = case.c.structure.nv - rows
     names = ", ".join(holding[:MAX_NAMED])
     begin = f"{_prescriber_title(case, name)} finds nothing to move: the constraints of {names} leave no freedom"
@@ -129,7 +129,7 @@ def _nothing_free(case: ContradictionCase, name: str, holding: list[str], rows: 
 
 
 def _nonparallel_axes(case: ContradictionCase, holding: list[str]) -> str:
-    """The axes that are not like the others."""
+    """Name the axes that are not parallel to most others."""
     s = case.c.structure
     axes = {}
     for name in holding:
@@ -153,7 +153,7 @@ def _nonparallel_axes(case: ContradictionCase, holding: list[str]) -> str:
 
 
 def _coordinate_not_moved(case: ContradictionCase, name: str, holding: list[str]) -> str:
-    """Something is free, but does not move what is asked for: in this position, or in none."""
+    """Explain that the free motion does not move the prescribed coordinate, in this position or in any."""
     c = case.c
     loose = c.structure.model.copy()
     loose.drivers, loose.initial = [], []
@@ -169,18 +169,21 @@ def _coordinate_not_moved(case: ContradictionCase, name: str, holding: list[str]
     c.at(case.t, case.q, case.v)
     if not near:
         return (
-            f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r}, which no freedom moves, here or nearby; free "
+            f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r}, which no freedom moves, here "
+            "or nearby; free "
             f"is {free}. Drive that, or leave it out"
         )
     return (
-        f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r} at a dead centre: in this position {free} moves it "
-        f"by nothing, next to it it does (constraints of {', '.join(holding[:MAX_NAMED])}). Begin a little way beside it, "
+        f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r} at a dead centre: in this "
+        f"position {free} moves it "
+        f"by nothing, next to it it does (constraints of {', '.join(holding[:MAX_NAMED])}). Begin a little way "
+        "beside it, "
         f"or ask for a motion of {free}"
     )
 
 
 def _coordinate_moves_at(case: ContradictionCase, name: str, q: np.ndarray) -> bool:
-    """Whether what the others leave free moves what is asked for, at another position."""
+    """Return whether the motion left free by the others moves the prescribed coordinate at another position."""
     c = case.c
     c.at(case.t, q, case.v)
     G = scaled_jacobian(c)[0].toarray()

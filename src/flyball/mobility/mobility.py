@@ -1,11 +1,10 @@
-"""Degrees of freedom and redundancy: Gruebler's count, the true rank, free motions and redundant sets by name.
+"""Degrees of freedom and redundancy: Gruebler's count, the rank, free motions and redundant sets by name.
 
-The counts are found at once, since every motion begins with them. What takes longer is found when it is asked
-for: the sets of constraints that depend on one another and their remedies (``sets``), the free motions by name
-(``motions``), and what the mobility depends on (``geometry``): counting, special dimensions, or a singular
-position. Two experiments decide the last: the frames of all joints are perturbed at random (freedom that is lost
-then depends on exact dimensions), and the mechanism is moved along its free motions and closed again (where the
-rank is larger there, the position is singular).
+The counts are computed at once, since every motion starts with them. The rest is computed on access: the sets of
+dependent constraints with their remedies (``sets``), the free motions by name (``motions``), and what the mobility
+depends on (``geometry``): counting, special dimensions, or a singular position. Two numerical experiments decide the
+last. The frames of all joints are perturbed at random; a freedom that is lost then depends on exact dimensions. The
+mechanism is moved along its free motions and closed again; where the rank is larger there, the position is singular.
 """
 
 from __future__ import annotations
@@ -42,12 +41,12 @@ from .null_spaces import (
 )
 from .remedies import find_remedies
 
-NEGLIGIBLE_SPEED = 1e-7  # part of a motion's largest velocity below which something stands still
-NAMING_THRESHOLD = 1e-2  # part of it that a coordinate must have to name the motion
+NEGLIGIBLE_SPEED = 1e-7  # relative velocity in a motion below which a body is at rest
+NAMING_THRESHOLD = 1e-2  # least relative rate of a coordinate by which a motion is named
 
 
 def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:
-    """A basis of the free motions in which each moves as few bodies as can be, named by what moves.
+    """Return a basis of the free motions in which each moves as few bodies as possible, named by what moves.
 
     Parameters
     ----------
@@ -74,7 +73,9 @@ def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:
 
 
 def _candidate_coordinates(a: Assembly) -> tuple[list[str], Any]:
-    """Coordinates that may name a motion, those next to ground first, then bodies' own; and their sparse gradients."""
+    """Return the coordinates by which motions may be named (nearest to ground first, then of bodies), and their
+    gradients.
+    """
     own = a.compiled
     model = own.structure.model
     depth = _joint_distances(model)
@@ -93,7 +94,7 @@ def _candidate_coordinates(a: Assembly) -> tuple[list[str], Any]:
 
 
 def _joint_distances(model: Any) -> dict[str, int]:
-    """How many joints a body is away from ground."""
+    """Return the number of joints between each body and ground."""
     depth = {"ground": 0}
     links = [tuple(model.carrier(n, j) for n in (j.body_i, j.body_j)) for j in model.joints]
     grown = True
@@ -111,9 +112,10 @@ def _joint_distance(depth: dict[str, int], model: Any, j: Joint) -> int:
 
 
 def _named_motions(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], D: Any) -> list[FreeMotion]:
-    """Motions that the same bodies share, told apart by coordinates of joints, then by how the bodies turn and move.
+    """Return motions of the same bodies, distinguished by joint coordinates, then by rotation and translation of
+    bodies.
 
-    Each coordinate chosen has the rate 1 in its own motion and 0 in the others.
+    Each chosen coordinate has the rate 1 in its own motion and 0 in the others.
     """
     c = a.compiled
     s = c.structure
@@ -128,7 +130,7 @@ def _named_motions(a: Assembly, basis: np.ndarray, bodies: list[str], names: lis
     labels = [names[k] for k in first] + [""] * len(turns) + [names[k] for k in later]
     rates = np.vstack([D[first] @ basis, turns @ basis, D[later] @ basis])
     full = np.concatenate([abs(D[first]) @ size, np.abs(turns) @ size, abs(D[later]) @ size])
-    left, chosen = np.eye(basis.shape[1]), []  # coefficients of what is not named yet
+    left, chosen = np.eye(basis.shape[1]), []  # coefficients of the motions not named yet
     for k, row in enumerate(rates):
         if not left.shape[1]:
             break
@@ -146,7 +148,7 @@ def _named_motions(a: Assembly, basis: np.ndarray, bodies: list[str], names: lis
 
 
 def _angular_velocity_rows(c: CompiledMechanism, b: int) -> np.ndarray:
-    """Rows that give the angular velocity of a spatial body in world axes."""
+    """Return rows that give the angular velocity of a spatial body in world axes."""
     out = np.zeros((3, c.structure.nv))
     v0 = int(c.values.system.tree.v[b])
     if c.values.system.tree.joint[b] == POINT:
@@ -177,7 +179,9 @@ def _free_motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMoti
 
 
 def _rotation_text(a: Assembly, name: str, u: np.ndarray) -> str:
-    """How a spatial body turns: about its own axis, where its mass centre and all its joints lie on that."""
+    """Describe the rotation of a spatial body; "about its own axis" if its mass centre and all its joints lie on the
+    axis.
+    """
     c = a.compiled
     b = c.structure.place[name]
     p, R = c.work.BK[b, :3], c.work.BK[b, 3:12].reshape(3, 3)
@@ -199,14 +203,14 @@ def _rotation_text(a: Assembly, name: str, u: np.ndarray) -> str:
     return f"turns about ({direction}) through ({where}) m"
 
 
-PERTURBATION = 0.03  # how far frames are shaken: part of the mechanism's length, and radians
-MOTION_STEP = 0.04  # how far the mechanism is moved: the same
+PERTURBATION = 0.03  # perturbation of frames, relative to the mechanism's length, and [rad]
+MOTION_STEP = 0.04  # displacement of the mechanism along free motions, in the same units
 MOTION_TRIALS = 6
-LEAST_DISPLACEMENT = 0.2  # part of a step that must be left of it when the mechanism is closed again
+LEAST_DISPLACEMENT = 0.2  # part of a step that must remain after the mechanism is closed again
 
 
 def mobility_geometry(m: Mobility, spaces: ConstraintNullSpaces) -> FreedomGeometry:
-    """What the freedoms of a count rest on."""
+    """Return what the freedoms of a count depend on."""
     if m.freedoms == 0:
         return FreedomGeometry(0, 0, 0, m.gruebler)
     a = spaces.assembly
@@ -224,7 +228,7 @@ def mobility_geometry(m: Mobility, spaces: ConstraintNullSpaces) -> FreedomGeome
 
 
 def nearby_positions(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
-    """Closed positions a small step along free motions, as far as there are any."""
+    """Return closed positions a small step along free motions, as far as they exist."""
     c = a.compiled
     model = c.structure.model
     near = c
@@ -250,7 +254,7 @@ def nearby_positions(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
 
 
 def _position_distance(c: CompiledMechanism, q: np.ndarray, start: np.ndarray) -> float:
-    """How far apart positions are [m], turns counted by the mechanism's length."""
+    """Return the distance of two positions [m], with angles times the mechanism's length."""
     size = np.ones(len(q))
     shifts = 2 if c.structure.model.planar else 3
     tree = c.values.system.tree
@@ -260,7 +264,7 @@ def _position_distance(c: CompiledMechanism, q: np.ndarray, start: np.ndarray) -
 
 
 def _perturbed_rank(a: Assembly) -> int:
-    """Rank where the frames of all joints are somewhere else, by a little and at random."""
+    """Return the rank with slightly and randomly perturbed joint frames."""
     c = compile_mechanism(a.compiled.structure.model, parameters=a.compiled.values.told)
     s = c.structure
     S = c.values.system
@@ -281,25 +285,22 @@ def _perturbed_rank(a: Assembly) -> int:
 
 
 CONTRADICTION_TOLERANCE = (
-    1e-8  # a dependency of unit size that adds up to more than this part of the mechanism's length contradicts
+    1e-8  # residual of a dependency of unit size, relative to the mechanism's length, above which it is contradictory
 )
 
-MAX_DEPENDENCIES = (
-    64  # constraints too many that are connected with one another, of which sets are sought in a large mechanism
-)
-LEAST_DRIVER_SHARE = (
-    1e-3  # part of the largest share in a dependency that a driver must have for the gap to be seen at it
-)
+MAX_DEPENDENCIES = 64  # redundant constraints of a connected part that are searched for sets in a large mechanism
+LEAST_DRIVER_SHARE = 1e-3  # relative share in a dependency from which on the disagreement is reported at a driver
 
 
 def redundant_sets(
     spaces: ConstraintNullSpaces, positions: list[np.ndarray], infinitesimal: bool, redundancy: int
 ) -> tuple[RedundantSet, ...]:
-    """The sets, smallest first. Cures hold in all these positions, and if those of the sets before are done too.
+    """Return the redundant sets, smallest first. Remedies hold in all these positions, together with those of earlier
+    sets.
 
-    ``infinitesimal``: the mechanism can shake but not move, so that what depends on one another does so here only.
-    ``redundancy``: constraints too many. Of a large mechanism in which more than `MAX_NAMED_MOTIONS` of them are connected with one
-    another, the sets found are not all there are.
+    ``infinitesimal``: the mechanism has an infinitesimal motion only, so that the dependencies exist only here.
+    ``redundancy``: number of redundant constraints. For a large mechanism with more than `MAX_DEPENDENCIES` connected
+    ones, the sets found are not complete.
     """
     lam, a = spaces.dependencies, spaces.assembly
     if not lam.shape[1]:
@@ -327,7 +328,7 @@ def redundant_sets(
         here_only = not what and (here_only or infinitesimal)
         cure = None if what or here_only else cure
         count = basis.shape[1]
-        if not all_found:  # those of a set's own rows are
+        if not all_found:  # count the dependencies of the set's own rows
             own = G[np.concatenate([groups[e] for e in numbers])].toarray()
             count = len(own) - rank(own)
         out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut, unit))
@@ -337,9 +338,9 @@ def redundant_sets(
 def _disagreement(
     basis: np.ndarray, g: np.ndarray, nu: np.ndarray, size: np.ndarray, c: CompiledMechanism
 ) -> tuple[str, float, str]:
-    """What the rows of a dependency disagree on, by how much, and the unit of that.
+    """Return on what the rows of a dependency disagree, by how much, and its unit.
 
-    Seen at the first driver among them, or at the row with the largest share.
+    It is reported at the first driver among them, or at the row with the largest share.
     """
     unit, length = basis / np.abs(basis).max(axis=0), c.values.length
     for what, off, scale, per in (
@@ -356,15 +357,15 @@ def _disagreement(
     return "", 0.0, ""
 
 
-MAX_NAMED_MOTIONS = 64  # free motions of a large mechanism that are named; counted are all
+MAX_NAMED_MOTIONS = 64  # free motions of a large mechanism that are named; all are counted
 
 
 class MobilityDetails(ConstraintNullSpaces):
-    """What a count found, and how more is found when it is asked for."""
+    """Data of a count, from which further results are computed on access."""
 
     @property
     def name(self) -> str:
-        """Of the mechanism."""
+        """Name of the mechanism."""
         return self.assembly.compiled.structure.model.name
 
     def sets(self, m: Mobility) -> tuple[RedundantSet, ...]:
@@ -377,7 +378,7 @@ class MobilityDetails(ConstraintNullSpaces):
     def motions(self, m: Mobility) -> tuple[FreeMotion, ...]:
         """See `Mobility.motions`."""
         a = self.assembly
-        a.compiled.at(a.t, a.q, a.v)  # turns are named by where bodies are
+        a.compiled.at(a.t, a.q, a.v)  # descriptions of rotations use the present positions
         large = max(m.rows, m.velocities) > DENSE
         return free_motions(a, self.velocities[:, : MAX_NAMED_MOTIONS if large else None])
 
@@ -394,19 +395,19 @@ def mobility(
     parameters: Mapping[str, float] | None = None,
     inertia: bool = False,
 ) -> Mobility:
-    """Freedoms and redundancy at a position.
+    """Compute freedoms and redundancy at a position.
 
     Parameters
     ----------
     model : Model
     a : Assembly, optional
-        Where; assembled at time ``t`` if not given. A mechanism that cannot be assembled is then looked at in the best
-        position found: the constraints that contradict one another are those that depend on one another there.
+        The position; assembled at time ``t`` if not given. A mechanism that cannot be assembled is examined at the best
+        position found: there the contradictory constraints are the dependent ones.
     t : float [s]
     parameters : mapping, optional
         Values of parameters in SI units, in place of the model's.
     inertia : bool
-        Refuse bodies that can move without any inertia: where forces are to move them, they could not.
+        Refuse bodies that can move without any inertia, whose motion forces would not determine.
 
     Returns
     -------
@@ -415,7 +416,7 @@ def mobility(
     Raises
     ------
     ModelError
-        If a body can move without any inertia and may not.
+        If ``inertia`` is set and a body can move without any inertia.
     AssemblyError
         If velocities disagree though positions do not depend on one another.
     """
@@ -428,7 +429,7 @@ def mobility(
                 raise
             a, gap = error.best, str(error)
     c = a.compiled
-    if c.structure.rows:  # else nothing is asked of where it is, and the engine need not be compiled
+    if c.structure.rows:  # otherwise there is nothing to evaluate, and the engine need not be compiled
         c.at(a.t, a.q, a.v)
     s, S = c.structure, c.values.system
     G, size, scale = scaled_jacobian(c, is_small(c))
@@ -447,14 +448,14 @@ def mobility(
     return Mobility(nv, nr, rank, tuple(names), loose, without, there, lam.shape[1])
 
 
-# Motions without inertia: the constraints allow them and no mass resists, so that nothing determines them.
+# Motions without inertia: the constraints allow them and no mass resists, so that they are undetermined.
 
 
-ROTATION_PART = 1e-3  # part of a motion that is no turn
+ROTATION_PART = 1e-3  # relative rotation below which a motion is a translation
 
 
 def massless_motions(a: Assembly, G: Any, scale: np.ndarray) -> np.ndarray:
-    """Motions (nv, k) that the constraints allow and no mass resists, from M + G^T G."""
+    """Return the motions (nv, k) that the constraints allow and no mass resists, from M + G^T G."""
     import scipy.sparse as sp
 
     M = sp.diags(scale) @ a.compiled.mass() @ sp.diags(scale)

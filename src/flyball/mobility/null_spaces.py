@@ -1,9 +1,9 @@
 """The scaled constraint Jacobian, its rank and null spaces, sparse bases of these, and self-stresses.
 
-Rows and columns of the Jacobian are scaled so that they compare. A null space is split into subspaces that no
-smaller set of elements carries (in matroid terms: circuits of the elements), first by what is not connected at
-all, then by leaving out one element after the other. Multipliers that act on nothing are self-stresses: they say
-which reaction components redundancy leaves undetermined.
+Rows and columns of the Jacobian are scaled to comparable units. A null space is split into subspaces that no smaller
+set of elements carries (in matroid terms: circuits of the elements), first into unconnected parts, then by leaving out
+one element after the other. Multipliers without effect are self-stresses: they show which reaction components
+redundancy leaves undetermined.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from ..tables.values import Values
 
 @dataclass(frozen=True)
 class ConstraintNullSpaces:
-    """Where a mechanism was looked at, and what the null spaces of its Jacobian are there."""
+    """The position at which a mechanism was examined, and the null spaces of its Jacobian there."""
 
     assembly: Assembly
-    dependencies: np.ndarray  # multipliers (nr, k) that act on nothing; all for which there is `ROOM`
-    allowed_velocities: np.ndarray | None  # velocities (nv, f) that the rows allow; None: found when asked for
+    dependencies: np.ndarray  # multipliers (nr, k) without effect; as many as `ROOM` allows
+    allowed_velocities: np.ndarray | None  # velocities (nv, f) that the rows allow; None: computed on access
     gap: str = ""  # why it cannot be assembled, if it cannot
 
     @property
     def velocities(self) -> np.ndarray:
-        """Velocities (nv, f) that the rows allow; all for which there is `ROOM`."""
+        """Velocities (nv, f) that the rows allow; as many as `ROOM` (in `numerics.sparse_rank`) allows."""
         if self.allowed_velocities is not None:
             return self.allowed_velocities
         a = self.assembly
@@ -46,20 +46,20 @@ class ConstraintNullSpaces:
 
 
 def velocity_scales(c: CompiledMechanism) -> np.ndarray:
-    """1 for velocities that are metres a second, 1 / length of the mechanism for those that are radians."""
+    """Return 1 for translational velocities, 1 / length of the mechanism for angular velocities."""
     return c.sizes / c.values.length
 
 
 def scaled_jacobian(c: CompiledMechanism, dense: bool = False) -> tuple[Any, np.ndarray, np.ndarray]:
-    """The Jacobian last evaluated with turns counted in lengths and rows of unit size, and both scales.
+    """Return the Jacobian last evaluated with rotations times length and rows of unit size, and both scales.
 
     Returns
     -------
-    G : sparse (nr, nv), or an array if that is wanted
+    G : sparse (nr, nv), or an array if ``dense``
     size : ndarray (nr,)
-        What rows were divided by.
+        Divisors of the rows.
     scale : ndarray (nv,)
-        What columns were multiplied with: velocities are ``scale`` times those that G takes.
+        Factors of the columns: velocities are ``scale`` times those of G.
     """
     scale = velocity_scales(c)
     if dense:
@@ -74,26 +74,26 @@ def scaled_jacobian(c: CompiledMechanism, dense: bool = False) -> tuple[Any, np.
 
 
 def jacobian_rank(c: CompiledMechanism) -> int:
-    """Rank of the Jacobian last evaluated."""
+    """Return the rank of the Jacobian last evaluated."""
     return sparse_matrix_rank(scaled_jacobian(c, is_small(c))[0])
 
 
 def is_small(c: CompiledMechanism) -> bool:
-    """Whether the Jacobian is so small that its rank is found from all of it, as an array."""
+    """Return whether the Jacobian is small enough for a rank from the dense matrix."""
     return max(len(c.structure.rows), c.structure.nv) <= FEW
 
 
-CHANGE_TOLERANCE = 1e-6  # part of the largest that a self-stress does to a component, below which it leaves it alone
+CHANGE_TOLERANCE = 1e-6  # relative effect of a self-stress on a reaction component that counts as zero
 COMPONENTS = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
 
 
 def self_stresses(
     x: Values, frame: Callable[[int], tuple], z: np.ndarray, lam: np.ndarray, names: list[str]
 ) -> dict[str, np.ndarray]:
-    """Wrenches (..., 6, k) on ``body_j`` at the joint's point there that each of the self-stresses makes.
+    """Return the wrenches (..., 6, k) on ``body_j`` at the joint's point there caused by each of the self-stresses.
 
-    World axes, torques divided by the mechanism's length. At one position, or at many: then numbers of the frames are
-    arrays (n,).
+    World axes, torques divided by the mechanism's length. At one position, or at many: then the entries of frame
+    records are arrays (n,).
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def self_stresses(
     frame : callable
         The kinematic record of a frame.
     z : ndarray (nz, ...)
-        Turns and places.
+        Angles and curve positions.
     lam : ndarray (..., nr, k)
         Self-stresses.
     names : list of str
@@ -123,7 +123,9 @@ def self_stresses(
 
 
 def undetermined_components(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, tuple[str, ...]]:
-    """Reaction components (world axes, on body_j) that self-stresses ``lam`` (nr, k) can change, of these elements."""
+    """Return the reaction components (world axes, on body_j) of these elements that self-stresses ``lam`` (nr, k)
+    change.
+    """
     c = a.compiled
     planar = c.structure.model.planar
     wrenches = self_stresses(c.values, lambda k: load_record(c.work.FK, k), c.z, lam, names)
@@ -142,28 +144,28 @@ def undetermined_components(a: Assembly, lam: np.ndarray, names: list[str]) -> d
 
 
 ROUNDING_TOLERANCE = 1e-8  # singular values below this are rounding; bases are orthonormal
-INDEPENDENCE_TOLERANCE = 1e-6  # those above this are of something new
+INDEPENDENCE_TOLERANCE = 1e-6  # singular values above this belong to independent directions
 
 
 def minimal_subspaces(
     N: np.ndarray, groups: Sequence[np.ndarray], max_dimensions: int | None = None
 ) -> list[tuple[list[int], np.ndarray]]:
-    """Subspaces that make up a null space, each carried by a set of elements from which none can be left out.
+    """Return subspaces that make up a null space, each carried by a minimal set of elements.
 
     Parameters
     ----------
     N : ndarray (n, k)
-        A basis of the null space, its rows in units in which they compare.
+        A basis of the null space, its rows in comparable units.
     groups : sequence of ndarray of int
         The rows of every element.
     max_dimensions : int, optional
-        Dimensions up to which a part that is connected by its elements is taken apart: of a larger one so many.
+        Largest number of dimensions of a connected part that is split; of a larger one only so many are used.
 
     Returns
     -------
     list of (elements, basis)
         Numbers of the elements, and vectors (n, c) that only they carry. All bases together are k independent vectors,
-        or fewer where ``max_dimensions`` is.
+        or fewer with ``max_dimensions``.
     """
     out: list[tuple[list[int], np.ndarray]] = []
     for part in _unconnected_parts(N, groups):
@@ -187,7 +189,7 @@ def minimal_subspaces(
 
 
 def _unconnected_parts(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The null space as a sum of spaces that share no element."""
+    """Return the null space as a sum of spaces that share no element."""
     from scipy.linalg import qr
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -206,7 +208,9 @@ def _unconnected_parts(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[np.n
 
 
 def _minimal_support(blocks: list[np.ndarray], order: list[int], found: np.ndarray) -> np.ndarray:
-    """Coefficients (k, p) of what is left when every element that can be spared is, and something new remains."""
+    """Return coefficients (k, p) of the rest after removing every element that can be spared while a new vector
+    remains.
+    """
     P = np.eye(found.shape[0])
     for e in order:
         B = blocks[e] @ P
@@ -219,7 +223,7 @@ def _minimal_support(blocks: list[np.ndarray], order: list[int], found: np.ndarr
 
 
 def _independent_part(found: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """The part of the columns of P, as they are, that is independent of what is found already."""
+    """Return the columns of P, unchanged in direction, that are independent of the vectors found already."""
     if not found.shape[1]:
         return P
     rest = P - found @ (found.T @ P)

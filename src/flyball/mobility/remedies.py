@@ -1,13 +1,13 @@
 """Remedies for redundant constraints: which joints to replace by weaker ones without adding a freedom.
 
-Let the columns of N be the multipliers that act on nothing. An element's rows R are replaced by weaker ones, T R,
-and T drops the directions Z (T Z = 0): of N the combinations z with Z^T N_e z = 0 are left. So a choice of
-changes is a remedy where the blocks Z^T N_e of its elements, one below the other, are square and regular: as many
-rows are dropped as there are vectors, and no vector is left. Since all new rows lie in the span of the old ones,
-the same motions are allowed as before. All this must hold here and in positions next to this one.
+Let the columns of N be the multipliers without effect. An element's rows R are replaced by weaker ones, T R, and T
+drops the directions Z (T Z = 0): of N the combinations z with Z^T N_e z = 0 remain. So a choice of changes is a remedy
+where the blocks Z^T N_e of its elements, stacked, are square and regular: as many rows are dropped as there are
+vectors, and no vector remains. Since all new rows lie in the span of the old ones, the same motions are allowed as
+before. All this must hold here and in nearby positions.
 
-Sets that share elements are treated one after the other, each together with those before. The cheapest choice is
-found by branch and bound. Which kinds of joints can be replacements, at what cost, their classes say
+Sets that share elements are treated one after the other, each together with those before. The cheapest choice is found
+by branch and bound. Which kinds of joints can be replacements, and at what cost, is given by class attributes
 (``replaceable``, ``stand_in``, ``omission``, ``called``).
 """
 
@@ -35,21 +35,21 @@ from ..numerics.rank import column_space, fundamental_subspaces, null_space
 from ..results.mobility import JointChange, Remedy
 from .null_spaces import ConstraintNullSpaces, velocity_scales
 
-MAX_CHANGES = 4  # elements that a choice changes
-MAX_TESTS_PER_SET = 200_000  # choices that are tested for one set, and
-MAX_TESTS = 400_000  # for all of a mechanism
+MAX_CHANGES = 4  # largest number of elements that a choice changes
+MAX_TESTS_PER_SET = 200_000  # largest number of choices tested for one set
+MAX_TESTS = 400_000  # the same for all sets of a mechanism
 SINGULAR_BLOCK_TOLERANCE = 1e-6  # a block with a smaller singular value is singular
 
 
 @dataclass
 class SearchBudget:
-    """How many choices may still be tested."""
+    """Number of choices that may still be tested."""
 
     tests: int = MAX_TESTS
 
 
 class CandidateChange(NamedTuple):
-    """What one element may let go: its orthonormal rows (positions, f, s) of the multipliers, and what it costs."""
+    """A change of one element: orthonormal rows (positions, f, s) of the multipliers that it releases, and its cost."""
 
     element: int
     number: int
@@ -58,16 +58,17 @@ class CandidateChange(NamedTuple):
 
     @property
     def freed(self) -> int:
-        """How many rows it lets go."""
+        """Number of rows that it releases."""
         return self.block.shape[1]
 
 
 def cheapest_combination(
     items: Sequence[CandidateChange], surplus: int, search_budget: SearchBudget
 ) -> tuple[list[CandidateChange] | None, str]:
-    """The cheapest choice whose blocks are square and regular in every position; equal ones in the order of elements.
+    """Return the cheapest choice with square and regular blocks in every position; among equal ones the first by
+    elements.
 
-    Partial choices are taken up by what they cost; those that cannot be better than the best one found are left alone.
+    Partial choices are expanded in the order of their cost; those that cannot improve on the best one are dropped.
     """
     if not items:
         return None, ""
@@ -100,7 +101,7 @@ def cheapest_combination(
 
 
 class Combination(NamedTuple):
-    """Items chosen, in the order in which choices are compared."""
+    """Chosen items; the fields are in the order in which choices are compared."""
 
     cost: float
     changes: int
@@ -108,13 +109,13 @@ class Combination(NamedTuple):
     items: tuple[int, ...]
 
     def extended(self, i: int, items: Sequence[CandidateChange]) -> Combination:
-        """With one more item, of a later element."""
+        """Return the combination with one more item, of a later element."""
         new = items[i]
         return Combination(self.cost + new.cost, self.changes + 1, (*self.elements, new.element), (*self.items, i))
 
 
 def _by_released_rows(items: Sequence[CandidateChange]) -> dict[int, tuple[list[int], np.ndarray]]:
-    """Numbers of the items that let go as many rows, and their blocks (items, positions, f, s)."""
+    """Return, by number of released rows, the numbers of the items and their blocks (items, positions, f, s)."""
     out = {}
     for f in sorted({i.freed for i in items}):
         numbers = [k for k, i in enumerate(items) if i.freed == f]
@@ -123,7 +124,7 @@ def _by_released_rows(items: Sequence[CandidateChange]) -> dict[int, tuple[list[
 
 
 def _remaining_multipliers(chosen: Sequence[CandidateChange], surplus: int, positions: int) -> np.ndarray:
-    """What is left of the multipliers: bases (positions, s, left) of what the blocks of a choice take to nothing."""
+    """Return bases (positions, s, left) of the multipliers that remain after a choice."""
     if not chosen:
         return np.broadcast_to(np.eye(surplus), (positions, surplus, surplus))
     blocks = np.concatenate([i.block for i in chosen], axis=1)
@@ -131,7 +132,7 @@ def _remaining_multipliers(chosen: Sequence[CandidateChange], surplus: int, posi
 
 
 def _regular_blocks(blocks: np.ndarray, free: np.ndarray) -> list[int]:
-    """Which blocks (items, positions, f, s) keep full rank on what is left (positions, s, left) in every position."""
+    """Return which blocks (items, positions, f, s) have full rank on the remaining multipliers in every position."""
     if not len(blocks):
         return []
     shown = blocks @ free
@@ -142,20 +143,20 @@ def _regular_blocks(blocks: np.ndarray, free: np.ndarray) -> list[int]:
     return np.flatnonzero(least.min(axis=1) > SINGULAR_BLOCK_TOLERANCE).tolist()
 
 
-MAX_DIRECTIONS = 12  # that are tried for the axes of joints that are put in
+MAX_DIRECTIONS = 12  # directions tried for the axes of replacement joints
 PARALLEL_TOLERANCE = 1e-9
 
 
 class ElementRows(NamedTuple):
-    """Rows of an element in every position, of unit size, turns counted in lengths."""
+    """Rows of an element in every position, of unit size, with rotations times length."""
 
-    columns: np.ndarray  # velocities that they speak of, (w,)
+    columns: np.ndarray  # velocities with nonzero entries, (w,)
     values: np.ndarray  # (positions, n, w)
 
 
 @dataclass(frozen=True)
 class Replacement:
-    """An element as it is (no change), or a change that is tried; what it costs; its rows."""
+    """An element unchanged (no change), or a possible change; its cost and its rows."""
 
     change: JointChange | None
     cost: float
@@ -165,7 +166,7 @@ class Replacement:
 def element_rows(
     c: CompiledMechanism, spaces: ConstraintNullSpaces, names: Sequence[str], positions: Sequence[np.ndarray]
 ) -> dict[str, ElementRows]:
-    """Rows of elements of a compiled mechanism in the position where it was looked at, and in those next to it."""
+    """Return the rows of elements of a compiled mechanism at the examined position and at nearby ones."""
     a = spaces.assembly
     S, still = c.values.system, np.zeros(c.structure.nv)
     ends, scale = S.row_start[: len(S.rows.law) + 1], velocity_scales(c)
@@ -191,7 +192,7 @@ def element_rows(
 def possible_replacements(
     spaces: ConstraintNullSpaces, names: list[str], positions: Sequence[np.ndarray]
 ) -> dict[str, list[Replacement]]:
-    """What could stand in the place of each element, as it is first, then by cost; all rows from one compilation."""
+    """Return the possible replacements of each element, unchanged first, then by cost, from one compilation."""
     own = spaces.assembly.compiled
     model, env = own.structure.model, own.values.told
     probe = model.copy()
@@ -220,7 +221,7 @@ def possible_replacements(
 
 
 def _weaker_joints(model: Model, e: Element, env: dict[str, float], directions: list[tuple]) -> Iterator[Joint]:
-    """Joints with fewer rows than a joint has, in its place."""
+    """Yield joints with fewer rows than the given one, in its place."""
     if not isinstance(e, Joint) or not e.replaceable:
         return
     wanted = _used_coordinates(model, e)
@@ -239,15 +240,15 @@ def _weaker_joints(model: Model, e: Element, env: dict[str, float], directions: 
 
 
 def _replacement_kinds(planar: bool) -> list[Any]:
-    """Kinds of joints that say they may be put in, the cheapest first, then those with the fewest rows."""
+    """Return the kinds of joints that may serve as replacements, cheapest first, then those with the fewest rows."""
     every: list[Any] = [c for c in Element.registry.values() if issubclass(c, Joint)]
-    flat = {c.in_space for c in every if not c.spatial} if planar else set()  # in the plane their own kinds serve
+    flat = {c.in_space for c in every if not c.spatial} if planar else set()  # in the plane the planar kinds are used
     kinds = [c for c in every if c.stand_in and (c.planar_normal if planar else c.spatial) and c.__name__ not in flat]
     return sorted(kinds, key=lambda c: (c.stand_in, len(c.blocks), c.__name__))
 
 
 def _axis_choices(model: Model, cls: Any, e: Any, env: dict[str, float], directions: list[tuple]) -> Iterator[dict]:
-    """The axes that a joint of that kind may have there."""
+    """Yield the axes that a joint of that kind may have there."""
     own = e.axis
     if hasattr(cls, "axes"):
         if own is not None and e.at is not None:
@@ -261,13 +262,13 @@ def _axis_choices(model: Model, cls: Any, e: Any, env: dict[str, float], directi
     if own is not None:
         yield {"axis": own}
     turns_freely = any(p.kind == "S" for p in cls.chain or ())
-    if e.at is not None and (own is None or turns_freely):  # else only the axis that is there fits
+    if e.at is not None and (own is None or turns_freely):  # otherwise only the present axis fits
         for d in directions:
             yield {"axis": d}
 
 
 def _candidate_directions(model: Model, names: Sequence[str], env: dict[str, float]) -> list[tuple]:
-    """Directions worth a try: the axes of joints of the sets, from joint to joint, and the axes of the world."""
+    """Return directions to try: axes of the sets' joints, directions from joint to joint, and the world axes."""
     d = 2 if model.planar else 3
     out: list[np.ndarray] = []
     points = []
@@ -290,7 +291,7 @@ def _candidate_directions(model: Model, names: Sequence[str], env: dict[str, flo
 
 
 def _used_coordinates(model: Model, e: Any) -> set[str]:
-    """Coordinates of a joint that drivers, couplings, forces, sensors or initial conditions name."""
+    """Return the coordinates of a joint that drivers, couplings, forces, sensors or initial conditions name."""
     texts = [d.coordinate for d in model.drivers] + [i.name for i in model.initial]
     texts += [x for c in model.couplings if isinstance(c, Coupling) for x in c.coupled()]
     texts += [x for f in model.forces if isinstance(f, CoordinateForce) for x in f.along()]
@@ -300,20 +301,20 @@ def _used_coordinates(model: Model, e: Any) -> set[str]:
     return {what for owner, _, what in (t.partition(".") for t in texts if t) if owner == e.name}
 
 
-MAX_ELEMENTS = 40  # of a set that are tried
-SPAN_TOLERANCE = 1e-6  # rows of unit size that agree to this lie in a span; a smaller singular value of a block is none
+MAX_ELEMENTS = 40  # largest number of elements of a set that are tried
+SPAN_TOLERANCE = 1e-6  # residual within which unit rows lie in a span; smaller singular values count as zero
 
 
 class RemedySearch(NamedTuple):
-    """What was found for a set."""
+    """Result of the search for a set."""
 
     cure: Remedy | None
-    here_only: bool  # whether it depends on itself here only, and not in all the other positions
-    cut: str  # how far the search went, where it found none and there is more that could be tried
+    here_only: bool  # whether the set is dependent here only, and not in all other positions
+    cut: str  # extent of the search, where it found none and was not complete
 
 
 class WeakerElement(NamedTuple):
-    """An option, and in every position how its rows are made of those that are there: T, and Z that T takes to 0."""
+    """An option, and its rows in terms of the present ones in every position: T, and Z with T Z = 0."""
 
     option: Replacement
     T: np.ndarray  # (positions, m, n)
@@ -323,7 +324,7 @@ class WeakerElement(NamedTuple):
 def find_remedies(
     spaces: ConstraintNullSpaces, sets: Sequence[tuple[str, ...]], positions: Sequence[np.ndarray]
 ) -> list[RemedySearch]:
-    """A cure for each set of elements, one after the other: those before are taken as done."""
+    """Return a remedy for each set of elements, one after the other, with the earlier remedies applied."""
     tried = possible_replacements(
         spaces, list(dict.fromkeys(name for s in sets for name in s[:MAX_ELEMENTS])), positions
     )
@@ -341,7 +342,7 @@ def find_remedies(
 
 
 def _sets_with_common_elements(sets: Sequence[tuple[str, ...]]) -> list[list[int]]:
-    """Numbers of the sets that share elements, directly or by way of others."""
+    """Return the numbers of the sets that share elements, directly or through others."""
     groups: list[tuple[set[str], list[int]]] = []
     for k, names in enumerate(sets):
         touched = [g for g in groups if g[0] & set(names)]
@@ -351,26 +352,26 @@ def _sets_with_common_elements(sets: Sequence[tuple[str, ...]]) -> list[list[int
 
 
 class CoupledSets:
-    """Sets that share elements: their rows as they are after the changes chosen so far, and what these let go.
+    """Sets that share elements: their rows after the changes chosen so far, and the rows released by these.
 
-    In every position the multipliers are combinations z of the columns of N, that act on nothing as long as nothing is
-    changed; those with ``gone`` z = 0 still do.
+    In every position the multipliers without effect are combinations z of the columns of N; after the changes those
+    with ``dropped_rows`` z = 0 remain.
     """
 
     def __init__(self, rows: dict[str, ElementRows], tried: dict[str, list[Replacement]]) -> None:
         self.rows, self.tried = dict(rows), tried
         ends = np.cumsum([r.values.shape[1] for r in rows.values()])[:-1]
         self.first = [dict(zip(rows, np.split(N, ends), strict=True)) for N in _dependencies(list(rows.values()))]
-        self.blocks = [dict(blocks) for blocks in self.first]  # rows of N by element, told by the new rows
+        self.blocks = [dict(blocks) for blocks in self.first]  # rows of N by element, in terms of the new rows
         self.dropped_rows = [np.zeros((0, _combination_count(blocks))) for blocks in self.first]
         self.treated = [
             np.zeros((_combination_count(blocks), 0)) for blocks in self.first
-        ]  # combinations: of the sets cured
+        ]  # combinations of the sets treated so far
         self.changed: set[str] = set()
         self.weaker_elements: dict[str, list[WeakerElement]] = {}
 
     def remedy_for(self, names: Sequence[str], budget: SearchBudget) -> RemedySearch:
-        """The cheapest changes that leave no multipliers to this set together with those cured before."""
+        """Return the cheapest changes that leave no multipliers to this set together with the sets treated before."""
         own = [_combinations_within(N, set(names)) for N in self.first]
         counts = [sum(len(N[n]) for n in names) - z.shape[1] for N, z in zip(self.first, own, strict=True)]
         here_only = max(counts) > counts[0]
@@ -389,10 +390,10 @@ class CoupledSets:
     def _chosen(
         self, names: Sequence[str], free: list[np.ndarray], budget: SearchBudget
     ) -> tuple[dict[str, WeakerElement] | None, str]:
-        """The cheapest changes of elements that leave nothing of the multipliers ``free`` (combinations of ours)."""
+        """Return the cheapest changes of elements that leave none of the multipliers ``free`` (combinations z)."""
         if not free[0].shape[1]:
             return {}, ""
-        fresh, again = [], []  # what is changed already stays if it can
+        fresh, again = [], []  # elements changed already are kept if possible
         for k, name in enumerate(names):
             N = np.stack([block[name] @ Y for block, Y in zip(self.blocks, free, strict=True)])
             items = _candidate_changes(k, self._weaker(name), N)
@@ -406,7 +407,7 @@ class CoupledSets:
         return None, cut
 
     def _weaker(self, name: str) -> list[WeakerElement]:
-        """What may take the place of an element as it is now."""
+        """Return the possible replacements of an element as it is now."""
         if name not in self.weaker_elements:
             own = self.rows[name]
             inverse = np.linalg.pinv(own.values, rcond=SPAN_TOLERANCE)
@@ -415,7 +416,7 @@ class CoupledSets:
         return self.weaker_elements[name]
 
     def _change(self, chosen: dict[str, WeakerElement]) -> None:
-        """Put rows in the place of others, and tell what is left of the multipliers by the new ones."""
+        """Replace rows, and express the remaining multipliers by the new ones."""
         for p, blocks in enumerate(self.blocks):
             for name, w in chosen.items():
                 self.dropped_rows[p] = np.vstack([self.dropped_rows[p], w.Z[p].T @ blocks[name]])
@@ -431,13 +432,13 @@ def _combination_count(blocks: dict[str, np.ndarray]) -> int:
 
 
 def _combinations_within(blocks: dict[str, np.ndarray], names: set[str]) -> np.ndarray:
-    """Which combinations of the multipliers speak of these elements only."""
+    """Return the combinations of the multipliers that involve these elements only."""
     others = [B for n, B in blocks.items() if n not in names]
     return null_space(np.vstack(others), SPAN_TOLERANCE, 1.0) if others else np.eye(_combination_count(blocks))
 
 
 def _dependencies(blocks: Sequence[ElementRows]) -> list[np.ndarray]:
-    """Multipliers (n, s) of the rows of elements, one below the other, that act on nothing, in every position."""
+    """Return multipliers (n, s) without effect of the stacked rows of elements, in every position."""
     columns = np.unique(np.concatenate([b.columns for b in blocks]))
     first = np.cumsum([0, *(b.values.shape[1] for b in blocks)])
     rows = np.zeros((len(blocks[0].values), first[-1], len(columns)))
@@ -447,7 +448,7 @@ def _dependencies(blocks: Sequence[ElementRows]) -> list[np.ndarray]:
 
 
 def _weaker_element(current: ElementRows, option: Replacement, inverse: np.ndarray) -> WeakerElement | None:
-    """How an option's rows are made of those there; None if they are not, or depend on one another."""
+    """Return an option's rows in terms of the present ones; None if that is impossible, or they are dependent."""
     new = option.rows
     if not np.isin(new.columns, current.columns).all():
         return None
@@ -464,7 +465,7 @@ def _weaker_element(current: ElementRows, option: Replacement, inverse: np.ndarr
 
 
 def _candidate_changes(k: int, weaker: Sequence[WeakerElement], N: np.ndarray) -> list[CandidateChange]:
-    """What can be part of a cure of multipliers N (p, n, s); of options that let go the same only the first."""
+    """Return the possible changes for multipliers N (p, n, s); of options that release the same rows only the first."""
     out: list[CandidateChange] = []
     known: set[tuple[int, bytes]] = set()
     for number, w in enumerate(weaker):

@@ -408,9 +408,7 @@ def has_switching_elements(model: Model) -> bool:
 
 
 def not_for_impulse_stepping(model: Model) -> list[Element]:
-    """Return the one-sided elements that impulse time stepping does not support: latches, rigid play, inextensible
-    ropes.
-    """
+    """The one-sided elements that impulse time stepping does not support: latches, rigid play, inextensible ropes."""
     known = "Limit"
     return [e for e in (*model.forces, *model.limits) if not e.acts() and type(e).__name__ != known]
 

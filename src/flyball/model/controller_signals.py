@@ -281,9 +281,7 @@ class _SignalGraph:
         self.way.pop()
         if told in self.rings:
             tree = solve_loop(tree, told, e.title, self.rings[told])
-        if all(
-            n.kind != "name" or n.value not in self.way for n in tree.walk()
-        ):  # in a loop it is known together with the others
+        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # in a loop: known with the others
             self.known[key] = tree
         return tree
 
@@ -324,7 +322,8 @@ class _SignalGraph:
         """Return the tree; refuse it if it is too long."""
         if sum(1 for _ in tree.walk()) > MAX_OPERATIONS:
             raise ModelError(
-                f"{whose} is a formula of more than {MAX_OPERATIONS} operations, controllers that follow one another at the same "
+                f"{whose} is a formula of more than {MAX_OPERATIONS} operations, controllers that follow "
+                f"one another at the same "
                 f"instant being put in; have some of them go through a state, or sample them (period=...)"
             )
         return tree
@@ -351,7 +350,8 @@ def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
         owner = name.partition(".")[0]
         if owner in controllers_by_name(model):
             raise ModelError(
-                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes a motion and needs "
+                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes "
+                f"a motion and needs "
                 f"two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller says"
             )
 

@@ -350,7 +350,8 @@ def checked_size(value: Any, dimension: str | None, where: str) -> Any:
     if not abs(value) <= LARGEST_NUMBER:
         unit = f" {dimension}" if dimension not in (None, "", "1") else ""
         raise ModelError(
-            f"{where}: {value:g}{unit} is beyond {LARGEST_NUMBER:g}, where squares and products overflow; is its unit right?"
+            f"{where}: {value:g}{unit} is beyond {LARGEST_NUMBER:g}, where squares and products "
+            f"overflow; is its unit right?"
         )
     return value
 

@@ -217,8 +217,7 @@ def _count(value: Any) -> Any:
 
 @element
 class Event(Element):
-    """An event at the zero crossing of a quantity: it is recorded in ``run.events``, and the actions ``do`` are
-    executed.
+    """An event at the zero crossing of a quantity: recorded in ``run.events``, with the actions ``do`` executed.
 
     The instant is located to the tolerance of the motion. Names are those of laws (``t``, parameters, sensors, tables),
     curves of positions and velocities: ``A.angle``, ``A.angle_rate``, ``slider.vx``, ``spring.length``, and forces of

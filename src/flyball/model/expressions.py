@@ -52,8 +52,7 @@ class Expression:
 
     @classmethod
     def parse(cls, text: str, tables: Collection[str] = (), curves: bool = False) -> Expression:
-        """Parse an expression; ``tables`` are names that it may call like functions, ``curves``: whether names may have
-        dots.
+        """Parse an expression; ``tables`` are names that it may call like functions, ``curves``: names may have dots.
 
         Raises
         ------
@@ -124,8 +123,7 @@ class Expression:
         refuse_expression(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
     def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:
-        """Return the value for the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables
-        called.
+        """The value for the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables called.
 
         Out of a function's domain the value is nan or inf, not an error. Raises `ExpressionError` for unknown names.
         Exceptions of a Python function are passed on.
@@ -382,8 +380,7 @@ _UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not",
 
 
 def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of named parameters, which may be numbers, quantities, or expressions of each other in any
-    order.
+    """The values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
 
     Raises
     ------

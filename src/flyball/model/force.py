@@ -140,7 +140,7 @@ class CoordinateForce(Force):
         "value": "",
         "rate": "/s",
         "force": "effort",
-    }  # names of its inputs, value and rate first
+    }  # inputs' names, value and rate first
     dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # dimensions of fields for a displacement and for an angle
         "stiffness": ("N/m", "N*m/rad"),
         "damping": ("N*s/m", "N*m*s/rad"),
@@ -160,7 +160,7 @@ class CoordinateForce(Force):
         return ""
 
     def along(self) -> tuple[str, ...]:
-        """Return the coordinates of the sum along which it acts, with weights `switch_weights`; empty if it has a path."""
+        """The coordinates of the sum along which it acts, with weights `switch_weights`; empty if it has a path."""
         return (self.coordinate_text(),) if self.coordinate_text() else ()
 
     def outward(self, n: SimpleNamespace) -> float:

@@ -71,8 +71,7 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
 
 
 def orientation_matrix(value: Any, what: str) -> np.ndarray:
-    """Return a rotation matrix from a quaternion (4, scalar first), Bryant angles (3, about x, then y, then z) or a
-    matrix.
+    """A rotation matrix from a quaternion (4, scalar first), Bryant angles (3, about x, then y, then z) or a matrix.
 
     Raises
     ------

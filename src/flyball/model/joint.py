@@ -80,9 +80,7 @@ class Joint(Element):
     needs_axis: ClassVar[bool] = False
     axisless: ClassVar[bool] = False  # value for axes that have no name of their own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
-    replaceable: ClassVar[bool] = (
-        False  # whether a joint with fewer constraints may replace it as a remedy for redundancy
-    )
+    replaceable: ClassVar[bool] = False  # whether a joint with fewer constraints may replace it as a remedy
     stand_in: ClassVar[float] = 0.0  # cost of using it as a replacement; 0: it is never proposed
     omission: ClassVar[float] = 3.5  # cost of leaving it out
     called: ClassVar[str] = ""  # its name in proposals, if not its kind
@@ -112,9 +110,7 @@ class Joint(Element):
         return [r for r in self.rows(planar) if self.chain is None or r in self.kept]
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """Return F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by
-        ``at``.
-        """
+        """F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by ``at``."""
         p = vector(n.at, planar, f"'at' of {self.title}")
         R = self.orientation(n.axis, planar)
         return (p, R), (p, R)
@@ -221,9 +217,7 @@ class Coupling(Element):
         raise NotImplementedError
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world in the reference
-        configuration.
-        """
+        """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world, as drawn."""
         raise NotImplementedError
 
     def first_weight(self, n: SimpleNamespace) -> float:

@@ -48,7 +48,8 @@ def refuse_unsupported(model: Model, analysis: str, knows: Collection[int] = (),
         return
     without = ", ".join(f"{e.name!r}: None" for e in parts)
     raise ModelError(
-        f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows {_unsupported_in_words(parts)}; simulate "
+        f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows "
+        f"{_unsupported_in_words(parts)}; simulate "
         f"does. Without them: m.changed({{{without}}}).{analysis}(...){_replacement_hint(parts)}"
     )
 

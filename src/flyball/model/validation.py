@@ -180,9 +180,7 @@ def refuse_ambiguous_names(
 
 
 def gravity_as_written(model: Model, value: Any) -> tuple | list:
-    """Return a vector of numbers and texts, not yet in SI units, owned by the model: a list if it may be changed in
-    place.
-    """
+    """A vector of numbers and texts, not yet in SI units, owned by the model: a list if it may be changed in place."""
     try:
         found = python_data(value)
     except (ValueError, TypeError, AttributeError) as error:

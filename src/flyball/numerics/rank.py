@@ -60,7 +60,7 @@ def fundamental_subspaces(
 
 
 def rank(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> int:
-    """Number of independent rows (and columns); parameters as for `fundamental_subspaces`."""
+    """Return the number of independent rows (and columns); parameters as for `fundamental_subspaces`."""
     return _count_nonzero(np.linalg.svd(A, compute_uv=False), tolerance, size) if A.size else 0
 
 

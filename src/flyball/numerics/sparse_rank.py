@@ -153,7 +153,7 @@ ROOM = 2**24  # largest number of entries (128 MB) of a null-space basis of a ma
 
 
 def sparse_matrix_rank(G: Any) -> int:
-    """Number of independent rows of a sparse matrix or an array."""
+    """Return the number of independent rows of a sparse matrix or an array."""
     if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
         return found[0]
     return rank_of_array(_as_array(G))
@@ -286,7 +286,7 @@ class SemidefinitePivots:
 
 
 def max_vectors(n: int) -> int:
-    """Number of vectors of n numbers that fit into `ROOM`."""
+    """Return the number of vectors of n numbers that fit into `ROOM`."""
     return max(ROOM // max(n, 1), 1)
 
 
@@ -296,7 +296,7 @@ def _scale_columns(x: np.ndarray) -> np.ndarray:
 
 
 def negative_pivots(A: Any) -> int:
-    """Number of negative eigenvalues of a sparse symmetric matrix (Sylvester's law of inertia)."""
+    """Return the number of negative eigenvalues of a sparse symmetric matrix (Sylvester's law of inertia)."""
     return int((_factor_shifted(A, 0.0)[2] < 0.0).sum())
 
 

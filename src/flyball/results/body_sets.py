@@ -16,12 +16,12 @@ SET_MEMBER_ARRAYS = {"mass": (), "inertia": (3, 3), "com": (3,)}  # of each body
 
 @dataclass(frozen=True, eq=False)
 class BodySetMotion:
-    """Motion of the mass centres of a set of bodies, and how their reference frames turn.
+    """Motion of the mass centres and rotations of the reference frames of a set of bodies.
 
     Attributes
     ----------
     name : str
-        Of the set; its members are ``name[0]``, ``name[1]``, ...
+        Name of the set; its members are ``name[0]``, ``name[1]``, ...
     mass : ndarray (m,) [kg]
     inertia : ndarray (m, 3, 3) [kg m^2]
         About each mass centre, along the axes of the reference frame.
@@ -86,12 +86,12 @@ class BodySetMotion:
         total = 0.5 * np.einsum("tmi,tmi->tm", self.velocity, self.velocity) @ self.mass
         w = self.angular_velocity
         ball = self.inertia[:, 0, 0]
-        if not np.array_equal(self.inertia, ball[:, None, None] * np.eye(3)):  # else no axes are needed
+        if not np.array_equal(self.inertia, ball[:, None, None] * np.eye(3)):  # otherwise no axes are needed
             w = np.stack(mtv(self.rotation, _component_arrays(w)), axis=2)
         return total + 0.5 * np.einsum("tmi,mij,tmj->t", w, self.inertia, w)
 
     def potential(self, gravity: np.ndarray) -> np.ndarray:
-        """Energy of gravity [J], zero where every mass centre lies in the world's origin, (n,)."""
+        """Return the energy of gravity [J], zero if every mass centre is at the world's origin, (n,)."""
         return -np.einsum("tmi,i,m->t", self.position, np.asarray(gravity, float), self.mass)
 
     def as_dict(self) -> dict[str, Any]:

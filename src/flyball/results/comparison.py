@@ -24,7 +24,7 @@ COLUMN_HEADS = ("|g|", "|G v - nu|", "energy [J]", "difference", "steps", "evalu
 
 @dataclass
 class Formulation:
-    """One formulation, and what became of the motion by it.
+    """One formulation, and the motion computed with it.
 
     Attributes
     ----------
@@ -100,9 +100,9 @@ class Comparison:
     t_end : float [s]
     formulations : tuple of Formulation
     reference : str
-        What the motions are compared with.
+        Reference motion of the comparison.
     energy : float [J]
-        Largest kinetic energy of the reference, nan if there is none: what drifts of energy are to be seen against.
+        Largest kinetic energy of the reference, nan if there is none: the reference for drifts of energy.
     options : dict
         Tolerances and the like, the same for all.
     """
@@ -132,7 +132,7 @@ class Comparison:
         return tuple(f.name for f in self.formulations)
 
     def lines(self) -> list[tuple[str, str]]:
-        """A table for people, and what did not reach the end."""
+        """Return a table, and the formulations that did not reach the end."""
         widths = [max(11, len(c)) for c in COLUMN_HEADS]
         out = [("formulation", " ".join(f"{c:>{w}}" for c, w in zip(COLUMN_HEADS, widths, strict=True)))]
         for f in self.formulations:

@@ -1,7 +1,7 @@
-"""Contacts of a motion: where bodies touch at each output time, their forces, and convergence of the solves.
+"""Contacts of a motion: contact points at each output time, their forces, and convergence of the solves.
 
-`Contacts` is a table with one row per contact and output time; `PairForce` sums the rows of a pair of bodies or
-sets. Of an event-driven motion the table is found from its constraint rows (`ContactHistory`).
+`Contacts` is a table with one row per contact and output time; `PairForce` sums the rows of a pair of bodies or sets.
+For an event-driven motion the table is computed from its constraint rows (`ContactHistory`).
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ class Convergence:
     x : ndarray (n,)
         Time at the end of the step [s], or number of the iteration.
     velocity : ndarray (n,) [m/s]
-        What is left of velocities that should vanish.
+        Residual of velocities that should vanish.
     force : ndarray (n,)
-        What is left of an impulse, over the largest one.
+        Residual of impulses, relative to the largest one.
     iterations : ndarray (n,) of int
         Iterations of each solve; of one solve's own history those up to the row.
     over : str
         What ``x`` is: ``"time"`` or ``"iteration"``.
     solver : str
-        Which solver it was.
+        The solver.
     objective : ndarray (n,) or None
         1/2 p' N p + b' p [J], of one solve's own history.
     """
@@ -78,12 +78,12 @@ STATES = ("stick", "slip", "open")
 
 
 class ContactBodies:
-    """Who touches: single bodies, ground and the members of sets, counted through.
+    """The sides of contacts: single bodies, ground and the members of sets, numbered consecutively.
 
     Parameters
     ----------
     names : names
-        Of bodies, of ``"ground"``, and of sets of bodies.
+        Names of bodies, of ``"ground"``, and of sets of bodies.
     counts : int
         For each name the number of members of the set, -1 for a single body.
     """
@@ -101,7 +101,7 @@ class ContactBodies:
         return self.names[owner] if self.counts[owner] < 0 else f"{self.names[owner]}[{k - self.first[owner]}]"
 
     def span(self, name: str) -> tuple[int, int]:
-        """First side of a name, and the one after its last: of a body, a set, or a member such as ``"balls[17]"``.
+        """The first side of a name, and the one after its last: of a body, a set, or a member such as ``"balls[17]"``.
 
         Raises
         ------
@@ -144,36 +144,37 @@ CONTACT_COLUMNS = {  # columns of the table: type, numbers a row
 class Contacts:
     """Contacts at the output times, row by row; the rows of time ``i`` are ``begin[i]`` to ``begin[i + 1]``.
 
-    ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``. In steps by
-    impulses the rows of a time are the contacts of the step that ends there. Such a step finds its contacts with the
-    poses of its start: ``point`` and ``gap`` belong to these, a step before the poses of the result at that time. With
-    every other method they belong to the output time. With arms from the mass centres at that time the torques are
-    those that turn the bodies: to rounding, but for contacts of two moving bodies in steps by impulses, where half a
-    step's motion is between the arms of the one and the other.
+    ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``. With impulse time
+    stepping the rows of a time are the contacts of the step that ends there. Such a step detects contacts in the poses
+    at its start: ``point`` and ``gap`` belong to these, a step before the poses of the result at that time. With every
+    other method they belong to the output time. With lever arms from the mass centres at that time, the torques are
+    those that act on the bodies: to rounding, except for contacts of two moving bodies with impulse time stepping,
+    where the lever arms of both differ by half a step's motion.
 
     Attributes
     ----------
     t : ndarray (n,) [s]
-    sides : Sides
-        Who touches.
+    sides : ContactBodies
+        The sides.
     begin : ndarray (n + 1,) of int
     pair : ndarray (k, 2) of int
         The two sides, as `ContactBodies` counts them.
     point : ndarray (k, 3) [m]
-        Where the force acts, midway between the surfaces, world axes; in steps by impulses where the step began.
+        Where the force acts, midway between the surfaces, world axes; with impulse time stepping at the start of the
+        step.
     normal : ndarray (k, 3)
-        From the first side to the second; in steps by impulses the one along which the impulse was found, of the start
-        of the step or of its middle.
+        From the first side to the second; with impulse time stepping the direction used for the impulse, at the start
+        of the step or at its middle.
     gap : ndarray (k,) [m]
-        Below zero where they overlap; in steps by impulses at the start of the step.
+        Negative if they overlap; with impulse time stepping at the start of the step.
     force : ndarray (k, 3) [N]
         On the second side, the mean over the step that ends at the time, world axes.
     state : ndarray (k,) of int
-        `STICK`, `SLIP` or `OPEN`, of which `STATES` has the names.
+        `STICK`, `SLIP` or `OPEN`, with names in `STATES`.
     friction : ndarray (k,)
         The coefficient that was used.
     history : Convergence or None
-        How far each solve of the run went, if that was asked for.
+        Convergence of each solve of the run, if requested.
     planar : bool
     """
 
@@ -224,7 +225,7 @@ class Contacts:
 
     @property
     def worst_overlap(self) -> float:
-        """Deepest overlap of the contacts in the table [m]; 0 if nothing overlapped. Whose poses: see `Contacts`."""
+        """Deepest overlap of the contacts in the table [m]; 0 if there is none. For the poses see `Contacts`."""
         return float(-np.min(self.gap, initial=0.0))
 
     @property
@@ -249,7 +250,7 @@ class Contacts:
         return self.taken([int(np.abs(self.t - float(t)).argmin())])
 
     def taken(self, times: Sequence[int] | np.ndarray) -> Contacts:
-        """The same at some of the output times, by their indices; one may be taken twice."""
+        """Return the table at some of the output times, by their indices; repeated indices are permitted."""
         times = np.asarray(times, int)
         begin = np.r_[0, np.cumsum(self.count[times])]
         rows = np.arange(begin[-1]) + np.repeat(np.asarray(self.begin)[times] - begin[:-1], self.count[times])
@@ -257,7 +258,7 @@ class Contacts:
         return replace(self, t=self.t[times], begin=begin, history=None, **own)
 
     def between(self, a: str, b: str) -> PairForce:
-        """What ``a`` does to ``b`` over time: the sum over all their contacts.
+        """Return the contact force of ``a`` on ``b`` over time: the sum over all their contacts.
 
         Parameters
         ----------
@@ -272,7 +273,7 @@ class Contacts:
         return self._summed(b, a)
 
     def on(self, name: str) -> PairForce:
-        """What all others do to a body, a member of a set, or a whole set, over time."""
+        """Return the contact force of all others on a body, a member of a set, or a whole set, over time."""
         return self._summed(name, None)
 
     def _summed(self, on: str, by: str | None) -> PairForce:
@@ -281,7 +282,7 @@ class Contacts:
         return self._known[on, by]
 
     def force_on(self, low: int, high: int) -> np.ndarray:
-        """Contact forces on the sides ``low`` to ``high`` (excluded), summed, (n, high - low, 3) [N], world axes."""
+        """The summed contact forces on the sides ``low`` to ``high`` (excluded), (n, high - low, 3) [N], world axes."""
         n, m = len(self.t), high - low
         out = np.zeros((n * m, 3))
         for side, sign in ((0, -1.0), (1, 1.0)):
@@ -352,7 +353,7 @@ class Contacts:
 
 
 def concatenate_contacts(every: Sequence[Contacts], t: np.ndarray) -> Contacts:
-    """Contacts of times that follow one another, as those of all of them."""
+    """Concatenate contacts of consecutive times."""
     begin = np.concatenate([[0], *(c.count for c in every)]).cumsum()
     columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in every]) for name in CONTACT_COLUMNS}
     return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, **columns)
@@ -366,27 +367,27 @@ def _text_array(names: list[str]) -> np.ndarray:
 
 
 class PairForce:
-    """What contacts do to one body (or set) over time, summed.
+    """The summed contact force on one body (or set) over time.
 
     Attributes
     ----------
     on, by : str
-        On whom, and by whom; ``by`` is empty where it is all others.
+        Affected and acting side; ``by`` is empty for all others.
     t : ndarray (n,) [s]
     force : ndarray (n, 3) [N]
         Sum on ``on``, world axes; (n, 2) in the plane.
     normal_force : ndarray (n,) [N]
-        Sum of the sizes along the normals: with opposite normals they do not cancel.
+        Sum of the magnitudes along the normals: opposite normals do not cancel.
     tangential_force : ndarray (n,) [N]
-        Size of the summed tangential forces.
+        Magnitude of the summed tangential forces.
     center : ndarray (n, 3) [m]
-        Mean point of the contacts, weighed by their normal forces; nan where nothing presses. In steps by impulses it
-        belongs to the start of the step that ends at the time, as ``gap`` does: see `Contacts`.
+        Mean point of the contacts, weighted by their normal forces; nan without contact force. With impulse time
+        stepping it belongs to the start of the step that ends at the time, as ``gap`` does: see `Contacts`.
     gap : ndarray (n,) [m]
-        The least of the contacts; nan where there is none.
+        The smallest gap of the contacts; nan if there is none.
     count : ndarray (n,) of int
     state : ndarray (n,) of int
-        `STICK` if all that press stick, `SLIP` if one slips, `OPEN` if nothing presses.
+        `STICK` if all loaded contacts stick, `SLIP` if one slips, `OPEN` if there is no contact force.
     """
 
     def __init__(self, contacts: Contacts, on: str, by: str, rows: np.ndarray, sign: np.ndarray) -> None:
@@ -430,7 +431,7 @@ class PairForce:
 
     @property
     def title(self) -> str:
-        """Who on whom, in words."""
+        """Title with both sides."""
         return f"{self.by or 'all others'} on {self.on}"
 
     def __repr__(self) -> str:
@@ -440,7 +441,7 @@ class PairForce:
 
 
 def pair_force(contacts: Contacts, on: str, by: str | None) -> PairForce:
-    """Sum what ``by`` (None: everyone else) does to ``on``.
+    """Sum the contact forces of ``by`` (None: all others) on ``on``.
 
     Raises
     ------

@@ -2,16 +2,15 @@
 
 Each check returns a text with a remedy, or nothing for a sound motion.
 
-Orientation errors: a turn in space is integrated as a quaternion, q' = q w / 2. A method of order p is off by
-about (w h)^(p + 1) a step there, and neither energy nor constraints show it. The error of a steady turn is known:
-of explicit methods from u' = i w u / 2 of a number u that every evaluation normalises, of `radau` from d' = w (1
-+ d^2 / 4), d being Cayley's step. Methods that control their error bound it, and generalised-alpha and the
-variational method have none.
+Orientation errors: a spatial rotation is integrated as a quaternion, q' = q w / 2. A method of order p has an error of
+about (w h)^(p + 1) per step, which neither energy nor constraints show. The error of a steady rotation is known: for
+explicit methods from u' = i w u / 2 with u normalised in every evaluation, for `radau` from d' = w (1 + d^2 / 4), d
+being Cayley's step. Methods with error control bound it, and generalised-alpha and the variational method have none.
 
-Acceleration defects: accelerations are solved anew at every output time, from a position and velocity that are
-right to the tolerance. A stiff spring makes a large force of a small error of its length. Where output times are
-closer than steps, the rate of the velocities between them is that of the method's polynomial; the difference is
-its defect.
+Acceleration defects: accelerations are solved for at every output time, from positions and velocities that are accurate
+to the tolerance. A stiff spring turns a small length error into a large force. If output times are closer than steps,
+the rate of the velocities between them is that of the method's polynomial; its difference from the accelerations is the
+defect.
 """
 
 from __future__ import annotations
@@ -35,14 +34,14 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-PULL_TOLERANCE = 1e-5  # part of the largest force of the motion above which a pull is no error of the integration
+PULL_TOLERANCE = 1e-5  # relative to the largest force of the motion: smaller pulling forces are integration errors
 
 
 def pull_warnings(result: Result) -> list[str]:
-    """A warning for each joint that stands for a one-sided contact and pulls at some output time.
+    """Return a warning for each joint that represents a one-sided contact and pulls at some output time.
 
-    Its normal force is the multiplier of its first row. Where redundant constraints leave that undetermined, its sign
-    says nothing.
+    Its normal force is the multiplier of its first row. If redundancy leaves it undetermined, its sign is not
+    evaluated.
     """
     x, undetermined = result.values, result.health.undetermined
     s = x.structure
@@ -59,7 +58,7 @@ def pull_warnings(result: Result) -> list[str]:
 
 
 def _largest_force(result: Result) -> float:
-    """The largest multiplier that is a force, or weight [N]."""
+    """Return the largest multiplier that is a force, or the weight [N]."""
     s, x = result.values.structure, result.values
     metric = sorted({t.row for t in s.terms if not t.measured and t.formula.measure == "m"})
     weight = float(np.linalg.norm(x.system.gravity) * x.system.bodies.mass.max(initial=0.0))
@@ -67,7 +66,7 @@ def _largest_force(result: Result) -> float:
 
 
 def _pull_warning(result: Result, joint: Joint, sign: float, force: np.ndarray, near: float) -> str:
-    """Of one joint; ``sign`` is that of the force while it pushes, 0 if nothing tells the side."""
+    """Return the warning on one joint; ``sign`` is that of the force while it pushes, 0 if the side is unknown."""
     remedy = f"press it on more strongly, or model the contact by shapes and Contact(...){joint.both_sides}"
     if sign == 0.0:
         if not min(force.max(), -force.min()) > near:
@@ -85,22 +84,22 @@ def _pull_warning(result: Result, joint: Joint, sign: float, force: np.ndarray, 
     )
 
 
-# Friction along one coordinate of a joint's surface where the surface slips along others too.
+# Friction along one coordinate of a joint's surface that also slips along others.
 
 
 TRANSVERSE_SLIP = (
-    0.1  # part of the slip along a friction's coordinate above which that across it counts: it takes 0.5 % there
+    0.1  # transverse slip relative to the slip along a friction's coordinate that matters: it reduces friction by 0.5 %
 )
-MIN_SLIP = 1e-3  # part of the mechanism's length above which slip across it is worth a word
-MIN_TURN = 1.0  # the same of a turn whose slip is unknown, since no radius is given [rad]
+MIN_SLIP = 1e-3  # relative to the mechanism's length: smaller transverse slip is not reported
+MIN_TURN = 1.0  # the same for an angle whose slip is unknown, since no radius is given [rad]
 
 
 def transverse_slip_warnings(result: Result) -> list[str]:
-    """What is said of frictions on `Cylindrical`, `Planar` and `PointInPlane` that slip across their coordinate.
+    """Warnings on frictions on `Cylindrical`, `Planar` and `PointInPlane` joints that slip across their coordinate.
 
-    A surface has one friction force, mu N against its whole slip. Friction in a joint knows the slip along its own
-    coordinate only: there it is too large by |v| / v, so that it may stick where the surface creeps, and across there
-    is none.
+    A surface has one friction force, mu N against its total slip. Friction in a joint uses the slip along its own
+    coordinate only: along it the friction is too large by the factor |v| / v, so that it may stick while the surface
+    creeps; across it there is none.
     """
     if len(result.t) < 2:
         return []
@@ -128,21 +127,21 @@ def transverse_slip_warnings(result: Result) -> list[str]:
 
 
 def _slip_distance(result: Result, f: Any, what: str) -> tuple[float, str]:
-    """How far the surfaces slip along a coordinate of the joint [m]; a turn without a radius [rad]."""
+    """Return the slip distance along a coordinate of the joint [m]; for an angle without a radius [rad]."""
     angle, radius = what.startswith("angle"), result.values.numbers[f.name].radius
     arm = 1.0 if not angle or radius is None else float(radius)
     speed = np.abs(result[f.joint].quantity(f"{what}_rate")[1])
     return arm * float(0.5 * (speed[1:] + speed[:-1]) @ np.diff(result.t)), "rad" if angle and radius is None else "m"
 
 
-MAX_ORIENTATION_ERROR = 0.02  # angle [rad] by which a body may be turned wrongly
-MAX_TURN, TURN_STEP = 12.0, 0.01  # turn in a step [rad] up to which its error is known; between two of which that is
-MAX_TURN_RADAU = 2.0 * np.arctan(3.0**0.5)  # the same of `radau`, which takes no wider steps
+MAX_ORIENTATION_ERROR = 0.02  # reported orientation error of a body [rad]
+MAX_TURN, TURN_STEP = 12.0, 0.01  # [rad] per step: range and spacing of the table of errors
+MAX_TURN_RADAU = 2.0 * np.arctan(3.0**0.5)  # the same for `radau`, which takes no larger steps
 NEWTON_ITERATIONS = 20  # iterations of Newton's method
 
 
 def orientation_error_warning(result: Result) -> str:
-    """What is to be said of a motion whose steps turn a body too far for their method; nothing where none does."""
+    """Return a warning if steps rotate a body too far for the method's order; nothing otherwise."""
     if not _has_fixed_step(result):
         return ""
     off, name, turn = 0.0, "", 0.0
@@ -169,7 +168,7 @@ def _has_fixed_step(result: Result) -> bool:
 
 
 def _orientation_error(result: Result, i: int) -> float:
-    """Largest angle [rad] by which a body is turned wrongly; i: first of its angular velocities."""
+    """Return the largest orientation error [rad] of a body; i: index of its first angular velocity."""
     o, w = result.health.options, result.v[:, i : i + 3]
     h = o["step"]
     turn, error = _turn_errors(o["method"])
@@ -181,7 +180,7 @@ def _orientation_error(result: Result, i: int) -> float:
 
 @lru_cache
 def _turn_errors(method: str) -> tuple[np.ndarray, np.ndarray]:
-    """Turns in a step [rad], and how much farther each comes out."""
+    """Return rotations per step [rad], and the error of each."""
     x = np.arange(0.0, MAX_TURN_RADAU if method == "radau" else MAX_TURN, TURN_STEP)
     return x, (_radau_turns(x) if method == "radau" else _explicit_turns(method, x)) - x
 
@@ -206,22 +205,22 @@ def _radau_turns(x: np.ndarray) -> np.ndarray:
     return out
 
 
-DEFECT_PART = 0.1  # of a body's largest acceleration by which it may miss the rate of the velocity
-DEFECT_SHARE = 0.1  # part of the output times at which it may miss it by more: jumps and short transients
+DEFECT_PART = 0.1  # defect relative to a body's largest acceleration
+DEFECT_SHARE = 0.1  # part of the output times at which larger defects are accepted: jumps and short transients
 OUTPUTS_PER_STEP = (
-    2  # output times to a step on average at least: else velocities between them are not one polynomial's
+    2  # least average number of outputs per step: else the velocities between outputs are not on one polynomial
 )
 REFERENCE_PART = (
-    0.1  # part of the fastest body's acceleration, and of gravity, that counts where a body has less of its own
+    0.1  # relative to the fastest body's acceleration, and gravity: reference for bodies with smaller accelerations
 )
-MIN_OUTPUTS = 16  # output times at least
+MIN_OUTPUTS = 16  # least number of output times
 
 
 def acceleration_defect_warning(result: Result) -> str:
-    """What is to be said of accelerations that are not the rates of the velocities; nothing where they are.
+    """Return a warning on accelerations that are not the rates of the velocities; nothing otherwise.
 
-    Of 1100 random motions, stiff ones among them, at tolerances from 0.1 to 1e-7, none is named whose accelerations
-    were right; none at 1e-4 and less.
+    Of 1100 random motions, stiff ones among them, at tolerances from 0.1 to 1e-7, there was no false warning; and no
+    warning at all at 1e-4 and less.
     """
     steps = result.health.steps
     if (
@@ -242,7 +241,7 @@ def acceleration_defect_warning(result: Result) -> str:
 
 
 def _worst_defect(r: Result, angular: bool) -> tuple[float, str, float, float, str]:
-    """Part of the output times at which a body's acceleration is off, its name, by how much, of what, and the unit."""
+    """The fraction of output times with a defect of a body, its name, the defect, the reference, and the unit."""
     S, length, inner = r.values.system, r.values.length, slice(2, -2)
     rows = np.flatnonzero(np.r_[True, np.diff(r.t) > 0.0])
     t, unit = r.t[rows], "rad/s^2" if angular else "m/s^2"
@@ -271,7 +270,7 @@ def _worst_defect(r: Result, angular: bool) -> tuple[float, str, float, float, s
 
 
 def _parabola_rate(t: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
-    """Derivative at every time of the parabola through it and those k before and after; nothing at the ends."""
+    """Return at every time the derivative of the parabola through it and those k before and after; nan at the ends."""
     out = np.zeros_like(v)
     before, after = (t[k:-k] - t[: -2 * k])[:, None], (t[2 * k :] - t[k:-k])[:, None]
     slopes = (v[k:-k] - v[: -2 * k]) / before, (v[2 * k :] - v[k:-k]) / after
@@ -279,43 +278,37 @@ def _parabola_rate(t: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
     return out
 
 
-DEFAULT_IMBALANCE = (
-    1e-4  # part of the energy moved above which the balance is worth a word, where no tolerance was asked for
-)
+DEFAULT_IMBALANCE = 1e-4  # relative to the energy moved: larger imbalances are reported if no tolerance was given
 RTOL_FACTOR, RTOL_FACTOR_PER_STEP = (
     10.0,
     0.1,
-)  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
-FINE_RTOL_FACTOR = (
-    3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
-)
+)  # times rtol: accepted imbalance of a short motion; it grows with each step
+FINE_RTOL_FACTOR = 3e-2  # times the root of rtol: the same for rtol so small that a digit more or less does not matter
 MAX_IMBALANCE, ROUGH_RTOL_FACTOR = (
     1e-2,
     5.0,
-)  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
-MAX_ROUGH_IMBALANCE = 2e-2  # part of the energy moved that no tolerance excuses
+)  # relative to the energy moved: limit for any number of steps; or so many times a large rtol
+MAX_ROUGH_IMBALANCE = 2e-2  # relative to the energy moved: limit for any tolerance
 DISSIPATED_PART = (
-    0.1  # part of what impacts and friction dissipate, beside which a numerical loss changes a motion little
+    0.1  # relative to the dissipation of impacts and friction: smaller numerical losses hardly change a motion
 )
-LIFTING_PART = (
-    1e-6  # part of the energy that lifts all bodies by one's size, which the residuals of solves may take at rest
-)
+LIFTING_PART = 1e-6  # relative to the energy that lifts all bodies by one's size: possible residuals of solves at rest
 MAX_INTERVALS, MIN_OUTPUTS_PER_INTERVAL = (
     64,
     4,
-)  # stretches that the balance is judged by at most, and rows of output in each at least
-SEEN_PART = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
-MAX_VIOLATION = 1e-6  # part of the mechanism's length above which violated constraints are
+)  # largest number of intervals for the balance, and least number of output rows in each
+SEEN_PART = 0.1  # part of the energy estimated from accelerations; if the rows show less, they miss the motion
+MAX_VIOLATION = 1e-6  # relative to the mechanism's length: larger constraint violations are reported
 MAX_ACCELERATION_VIOLATION = (
-    1e-8  # part by which accelerations may miss the constraints: reactions miss by up to 1e4 times it
+    1e-8  # relative acceleration error of constraints: reactions are wrong by up to 1e4 times it
 )
-REST_SPEED = 1e-7  # lengths of the mechanism a second that count as rest
-MIN_CREEP = 1e-3  # part of the mechanism's length above which creep is
+REST_SPEED = 1e-7  # lengths of the mechanism per second that count as rest
+MIN_CREEP = 1e-3  # relative to the mechanism's length: larger creep is reported
 
 
 def motion_warnings(result: Result) -> tuple[str, ...]:
-    """Reasons to look at a result twice, each with what can be done; none for a sound one."""
-    _ = result.vdot  # finding accelerations adds to the remarks where there are none
+    """Return reasons to check a result, each with a remedy; none for a sound result."""
+    _ = result.vdot  # solving for accelerations adds to the remarks
     texts = [
         *result.health.remarks,
         *doubt_messages(result),
@@ -330,7 +323,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
 
 
 def doubt_messages(result: Result) -> tuple[str, ...]:
-    """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
+    """Return reasons why a motion may not satisfy its tolerance; none for a sound motion."""
     ledger = total_budget(result)
     balance = _balance_warning(ledger) or lag_warning(ledger)
     return tuple(
@@ -346,7 +339,7 @@ def doubt_messages(result: Result) -> tuple[str, ...]:
 
 
 def impulse_stepping_doubts(result: Result) -> tuple[str, ...]:
-    """The same of a motion by impulse time stepping: what the method itself took or gave, and contacts that failed."""
+    """Return the same for impulse time stepping: energy errors of the method, and unconverged contacts."""
     taken = result.energy.exchanged("numerical_loss")
     lost = float(np.max(np.abs(taken), initial=0.0))
     own = result.health.contact.doubts if result.health.contact else ()
@@ -365,7 +358,7 @@ def impulse_stepping_doubts(result: Result) -> tuple[str, ...]:
 
 
 def _lifting_energy(result: Result) -> float:
-    """Energy [J] that lifts all bodies by the size of the smallest that touches: no origin of coordinates counts."""
+    """The energy [J] that lifts all bodies by the size of the smallest body in contact, independent of the origin."""
     if result.health.contact is None:
         return 0.0
     mass = float(sum(total_budget(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
@@ -373,16 +366,16 @@ def _lifting_energy(result: Result) -> float:
 
 
 def impulse_stepping_warnings(result: Result) -> tuple[str, ...]:
-    """All that there is to say about a motion by impulse time stepping."""
+    """Return all warnings on a motion by impulse time stepping."""
     return (*result.health.remarks, *result.health.doubtful, *pull_warnings(result))
 
 
 def expected_imbalance(result: Result) -> float:
-    """Part of the energy moved by which the balance of a sound motion may be off.
+    """Return the energy imbalance to be expected of a sound motion, relative to the energy moved.
 
-    Errors of steps add up: a motion of few steps comes out to some units of its tolerance, one of ten thousand to a
-    thousand. Of 1270 random motions, stiff ones among them, by three methods at tolerances from 1e-2 to 1e-7, that came
-    out to ten times their tolerance, 1.6 in a hundred are off by more.
+    Errors of steps accumulate: a motion of few steps is accurate to a few times its tolerance, one of ten thousand
+    steps to a thousand times. Of 1270 random motions, including stiff ones, by three methods at tolerances from 1e-2 to
+    1e-7, all accurate to ten times their tolerance, 1.6 % exceed this value.
     """
     o = result.health.options
     rtol = o.get("rtol")
@@ -393,15 +386,15 @@ def expected_imbalance(result: Result) -> float:
 
 
 def energy_moved(result: Result) -> float:
-    """How much energy the motion shifted about [J]: what the balance is measured by.
+    """Return the energy moved by the motion [J], the reference for its imbalance.
 
-    The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
+    It is the sum of the largest kinetic energy and of the ranges of the gravity and spring energies and of every work.
     """
     return float(total_budget(result).moved(0, len(result.t)))
 
 
 def _balance_warning(x: EnergyBudget) -> str:
-    """What is said of all of it; or else of the part whose balance is worst, of those that nothing connects."""
+    """Return the warning for the whole mechanism, or else for the unconnected part with the worst balance."""
     found, result = _worst_imbalance(x), x.result
     if not found and result.health.options.get("rtol") is not None:
         found = max(
@@ -411,13 +404,13 @@ def _balance_warning(x: EnergyBudget) -> str:
 
 
 def _worst_imbalance(x: EnergyBudget) -> tuple[float, str] | tuple[()]:
-    """How many times more than expected a balance is off, and that in words; nothing where it is not.
+    """Return the ratio of the imbalance to the expected one, with a text; nothing if it is not exceeded.
 
-    What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
+    A connected part is judged by its own energy.
     """
     rows, t = len(x.result.t), x.result.t
     if all(lost <= allowed for _, _, lost, _, allowed in _imbalances(x, rows, np.zeros(rows), 0.0)):
-        return ()  # what stands in no row, and rounding, only allow for more
+        return ()  # energies between the rows, and rounding, only increase the accepted imbalance
     for begin, end, lost, there, allowed in _imbalances(x, rows, _kinetic_between_outputs(x), _rest_energy(x)):
         if lost > allowed and x.known(begin, end):
             when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
@@ -428,15 +421,15 @@ def _worst_imbalance(x: EnergyBudget) -> tuple[float, str] | tuple[()]:
 def _imbalances(
     x: EnergyBudget, rows: int, between_outputs: np.ndarray, least: float
 ) -> Iterator[tuple[int, int, float, float, float]]:
-    """First row and last (not counted), what is lost there, moved and to be expected [J].
+    """Yield the first row and the one after the last, and the energy lost, moved and expected to be lost there [J].
 
-    ``between_outputs`` and ``least``: see `_kinetic_between_outputs` and `_rest_energy`. Of all rows, then of the stretches where more may be lost than
-    that.
+    ``between_outputs`` and ``least``: see `_kinetic_between_outputs` and `_rest_energy`. First for all rows, then for
+    the intervals where the loss may be larger.
     """
     part, moved = expected_imbalance(x.result), x.moved(0, rows) + float(between_outputs.max(initial=0.0))
     yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
     for begin, end in _suspect_intervals(x, rows, x.kinetic + between_outputs, (part, moved, least)):
-        # velocities v are as far off as those of what moves most, u: by m v du
+        # velocities v have the absolute error du of the fastest body, and so an energy error m v du
         lost = float(np.ptp(x.balance[begin:end]))
         there = x.moved(begin, end) + float(between_outputs[begin:end].max())
         yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
@@ -445,11 +438,11 @@ def _imbalances(
 def _suspect_intervals(
     x: EnergyBudget, rows: int, kinetic: np.ndarray, known: tuple[float, float, float]
 ) -> Iterator[tuple[int, int]]:
-    """Stretches in which more may be lost than is to be expected, by the kinetic energy there alone."""
+    """Return intervals in which the loss may exceed the expected one, by the kinetic energy there alone."""
     part, moved, least = known
     for edges in _intervals(x.result, rows):
         begins, ends = edges[:-1], edges[1:] + 1
-        at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each stretch, and what is between its end and the next
+        at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each interval, and the gap between its end and the next
         high, low, most = (
             f.reduceat(a, at)[::2] for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
         )
@@ -468,8 +461,9 @@ def _imbalance_text(x: EnergyBudget, when: str, lost: float, moved: float, allow
 
 
 def _intervals(result: Result, rows: int) -> Iterator[np.ndarray]:
-    """Ends of the halves, quarters and so on of the rows of a motion that was integrated: what something else
-    dissipated before, or moves after, does not speak for what happens in one.
+    """Return the ends of the halves, quarters and so on of the rows of an integrated motion.
+
+    Energy dissipated before or moved after an interval must not hide losses within it.
     """
     pieces = 2
     while (
@@ -482,9 +476,10 @@ def _intervals(result: Result, rows: int) -> Iterator[np.ndarray]:
 
 
 def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
-    """Kinetic energy [J] that is moved about every output time and stands in none: rows once a turn see bodies at rest.
+    """Return the kinetic energy [J] between output times that no row shows: one row per turn may show bodies at rest.
 
-    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have.
+    It is estimated from the accelerations over a step, if there are more steps than rows and the estimate is much
+    larger.
     """
     r = x.result
     none = np.zeros_like(x.kinetic)
@@ -495,13 +490,13 @@ def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
 
 
 def _rest_energy(x: EnergyBudget) -> float:
-    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
+    """The energy [J] below which bodies count as at rest: rounding of the potential energy, and creep of all bodies.
 
-    The potential energy is that stored and that of the weight at the mechanism's length: where it is counted from is
+    The potential energy is that stored in springs and that of the weight at the mechanism's length, since its zero is
     arbitrary.
 
-    Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
-    rows have them.
+    If work is done, possibly between two rows, the energy that moves all bodies through their travel in the available
+    time is added.
     """
     length, t = x.result.values.length, x.result.t
     rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
@@ -546,7 +541,7 @@ def _undetermined_force_warnings(result: Result) -> list[str]:
 
 
 def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str, ...]]) -> list[tuple[str, tuple]]:
-    """Forces and torques of joints that events name and that are undetermined, with what of these is.
+    """Return the undetermined forces and torques of joints that events name, with their undetermined components.
 
     Parameters
     ----------
@@ -564,7 +559,7 @@ def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str
 def undetermined_loads(
     frictions: Iterable[Any], undetermined: Mapping[str, tuple[str, ...]]
 ) -> list[tuple[Any, tuple]]:
-    """Frictions whose load counts components of their joint's reaction that are undetermined, with these.
+    """Return frictions whose load depends on undetermined components of the joint's reaction, with these components.
 
     Parameters
     ----------
@@ -587,10 +582,10 @@ def _creep_warnings(result: Result) -> list[str]:
 
 
 def friction_creep(result: Result) -> dict[str, tuple[float, float]]:
-    """Joint friction -> (largest speed [m/s], distance [m]) of its surfaces while it should stick.
+    """Return joint friction -> (largest speed [m/s], distance [m]) of its surfaces while they should stick.
 
-    Of the regularised law: it should stick while it slides at less than three times its stick speed, for two output
-    times running or more; what passes through rest between two output times is no creep.
+    It applies to the regularised law: surfaces should stick while they slide at less than three times the stick speed,
+    for at least two consecutive output times; a reversal between two output times is not creep.
     """
     found = {}
     S, forces = result.values.system, result.values.structure.forces
@@ -610,5 +605,5 @@ def friction_creep(result: Result) -> dict[str, tuple[float, float]]:
 
 
 def _frictions_with_load(result: Result) -> list[Any]:
-    """Forces that follow what a joint carries: friction."""
+    """Return the joint frictions, whose force depends on the joint's load."""
     return [e for e in result.values.structure.loads if hasattr(e, "load")]

@@ -1,9 +1,9 @@
 """Energies over time, their balance as a whole and of unconnected parts, and the phase error they cause.
 
-`Energy` is what a result shows. `EnergyBudget` holds the terms of the balance for all bodies, or for those that
-joints and forces connect; ``results/diagnostics.py`` judges it. Without drives and damping the speed of a motion
-of one freedom follows from its energy: where the kinetic energy T is off by dE, it is faster by the part dE / 2T,
-and the integral of that is how far it comes to be early.
+`Energy` is the part of a result with the energies. `EnergyBudget` contains the terms of the balance for all bodies, or
+for connected parts; ``results/diagnostics.py`` evaluates it. Without drives and damping the speed of a motion with one
+degree of freedom follows from its energy: if the kinetic energy T is wrong by dE, the speed is wrong by the fraction dE
+/ 2T, and its integral is the time by which the motion is early.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 
 EXCHANGE_SIGNS = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0, "numerical_loss": -1.0}
-"""Energies that contacts exchange, and by which sign the bodies have them.
+"""Energies exchanged by contacts, with the sign of the bodies' share.
 
-The last is the error of impulse time stepping: what the method itself took.
+The last one is the energy error of impulse time stepping itself.
 """
 CONTACT_ELASTIC = "contact_elastic"
-"""Energy stored in contacts that give way, among what contacts exchange."""
+"""Energy stored in compliant contacts, among the energies exchanged by contacts."""
 
 
 def kinetic_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
@@ -71,17 +71,17 @@ class Energy(NamedQuantities):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Title in messages."""
         return ENERGY
 
     @property
     def names(self) -> dict[str, Quantity]:
-        """Everything that it has, by name."""
+        """All its quantities by name."""
         return quantities(self._result.model, ENERGY)
 
     @cached_property
     def _bodies(self) -> list[int]:
-        """Rows of the body table, but for bodies that stand for something else."""
+        """Rows of the body table, without replacement bodies."""
         s = self._result.values.structure
         aside = {s.place[name] for name in s.model.aside if name in s.place}
         return [b for b in range(len(self._result.values.system.tree.parent)) if b not in aside]
@@ -119,10 +119,10 @@ class Energy(NamedQuantities):
 
     @cached_property
     def work(self) -> dict[str, np.ndarray]:
-        """Work that each damper, actuator, motor, given force and driver has put in since the start.
+        """Work done since the start by each damper, actuator, motor, given force and driver.
 
-        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a
-        change of its stiffness gave it, which an event did.
+        It excludes energy stored in a spring of the same element, which is potential energy, and the energy of
+        stiffness changes, which is done by events.
         """
         out = {}
         r = self._result
@@ -135,16 +135,16 @@ class Energy(NamedQuantities):
         return out
 
     def _concatenated(self, name: str) -> np.ndarray:
-        """One of the energies, where parameters changed on the way."""
+        """One of the energies, concatenated if parameters changed during the motion."""
         return np.concatenate([getattr(p.energy, name) for p in self._result.pieces])
 
     def exchanged(self, name: str) -> np.ndarray:
-        """Energy since the start that contacts and events lost or gave, by its name; zeros where there are none."""
+        """Energy since the start that contacts and events lost or gave, by its name; zeros if there are none."""
         found = self._result.exchanged.get(name)
         return self._result.motions.zeros() if found is None else found
 
     def _friction_loss(self) -> np.ndarray:
-        """Lost in friction of contacts since the start: that of places is a work, integrated with the motion."""
+        """Energy lost in friction of contacts since the start; for contact points an integrated work."""
         r = self._result
         at = r.values.structure.state_at
         own = (at.get(f"{e.name}.work") for e in r.values.structure.model.forces if isinstance(e, Touch))
@@ -165,7 +165,7 @@ class Energy(NamedQuantities):
 
     @property
     def drift(self) -> float:
-        """Largest deviation from the balance [J]; nan where fewer than two output times leave nothing to compare."""
+        """Largest deviation from the balance [J]; nan if there are fewer than two output times."""
         return float(np.abs(self.balance).max()) if len(self._result.t) > 1 else float("nan")
 
 
@@ -183,7 +183,8 @@ class EnergyBudget:
         Of gravity, and in springs.
     works : tuple of ndarray (n,)
     foreign : ndarray (n,)
-        What impacts, contacts and events exchanged that the balance does not know of: it holds where this is constant.
+        Energy exchanged by impacts, contacts and events that the balance does not include: the balance is valid while
+        this is constant.
     """
 
     result: Result
@@ -206,18 +207,18 @@ class EnergyBudget:
 
     @property
     def squared_travel(self) -> np.ndarray:
-        """Square of how far each of the bodies came about [m^2]."""
+        """Square of the approximate travel of each body [m^2]."""
         r = self.result.motions
         x, y, z = (np.ptp(p, axis=1) for p in r.bodies(self.bodies)[0])
         return x**2 + y**2 + z**2
 
     def known(self, begin: int, end: int) -> bool:
-        """Whether the balance holds between two rows, the last not counted."""
+        """Return whether the balance is valid from row ``begin`` to the one before ``end``."""
         return not np.ptp(self.foreign[begin:end]) > 0.0
 
     @property
     def of(self) -> str:
-        """Whose it is, in words; empty: that of all."""
+        """Description of its bodies; empty for all."""
         if len(self.bodies) == len(self.result.values.system.tree.parent):
             return ""
         place = {b: name for name, b in self.result.values.structure.place.items()}
@@ -227,9 +228,10 @@ class EnergyBudget:
         return f" of {name!r}" + (f"{others} connected with it" if more else "")
 
     def moved(self, begin: int, end: int) -> float:
-        """How much energy was shifted about between two rows, the last not counted [J].
+        """Return the energy moved between two rows, the last excluded [J].
 
-        The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
+        It is the sum of the largest kinetic energy and of the ranges of the gravity and spring energies and of every
+        work.
         """
         if end <= begin:
             return 0.0
@@ -238,7 +240,7 @@ class EnergyBudget:
 
 
 def total_budget(result: Result) -> EnergyBudget:
-    """That of everything."""
+    """Return the budget of all bodies."""
     e = result.energy
     every = np.arange(len(result.values.system.tree.parent))
     none = result.motions.zeros()
@@ -246,9 +248,9 @@ def total_budget(result: Result) -> EnergyBudget:
 
 
 def budgets_by_part(result: Result) -> list[EnergyBudget]:
-    """Those of parts that neither joints nor forces connect; none where all hangs together.
+    """Return the budgets of parts that neither joints nor forces connect; none if everything is connected.
 
-    What impacts and events exchanged nobody knows by parts.
+    Energies exchanged by impacts and events are not known by parts.
     """
     S = result.values.system
     part = result.values.structure.kept.get("connected", None, 1, partial(connected_parts, S))
@@ -277,10 +279,11 @@ def budgets_by_part(result: Result) -> list[EnergyBudget]:
 
 
 def connected_parts(S: System) -> np.ndarray:
-    """The part to which each row of the body table belongs, (nb,): joints, couplings and forces connect them."""
-    first = list(
-        range(len(S.tree.parent))
-    )  # of what each hangs together with, as far as it is known: a body before it, or itself
+    """Return the number of the connected part of each row of the body table, (nb,).
+
+    Bodies are connected by joints, couplings and forces.
+    """
+    first = list(range(len(S.tree.parent)))  # union-find parents: a body before it in the same part, or itself
     pairs = [(b, parent) for b, parent in enumerate(S.tree.parent.tolist()) if parent >= 0]
     some = [
         *(_bodies_of_row(S, k) for k in range(len(S.rows.law))),
@@ -293,7 +296,7 @@ def connected_parts(S: System) -> np.ndarray:
 
 
 def _bodies_of_row(S: System, k: int) -> np.ndarray:
-    """Bodies of a row, or of a measured quantity behind all rows."""
+    """Return the bodies of a row, or of a measured quantity (numbered after all rows)."""
     body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
     return np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]])
 
@@ -308,7 +311,7 @@ def _bodies_of_force(S: System, k: int) -> np.ndarray:
 
 
 def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
-    """The part that an element acts on, or -1."""
+    """Return the part on which an element acts, or -1."""
     s, S = result.values.structure, result.values.system
     if e.name in s.prescribed:
         return int(part[s.prescribed[e.name]])
@@ -322,20 +325,20 @@ def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
 
 
 def _exchanged_by_events(result: Result) -> np.ndarray:
-    """What impacts, contacts and events took or gave since the start, (n,) [J]."""
+    """Return the energy that impacts, contacts and events took or gave since the start, (n,) [J]."""
     e = result.energy
     return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGE_SIGNS, EVENT_WORK)), result.motions.zeros())
 
 
-MAX_LAG = 0.05  # part of the longest way of a body by which one may be off
-NEGLIGIBLE_TRAVEL = 1e-6  # part of the mechanism's length that is no way
-TURNING_POINT = 0.1  # part of the largest kinetic energy below which a motion that comes back is at its turning point
+MAX_LAG = 0.05  # position error relative to a body's travel
+NEGLIGIBLE_TRAVEL = 1e-6  # relative to the mechanism's length: smaller travel is ignored
+TURNING_POINT = 0.1  # relative to the largest kinetic energy: below it an oscillating motion is at a turning point
 
 
 def lag_warning(x: EnergyBudget) -> str:
-    """What is to be said of a motion of one freedom whose energy is off; nothing where it comes out in time.
+    """A warning on the phase error of a motion with one degree of freedom, from its energy error; nothing if small.
 
-    Not where steps outnumber output times, which may miss when it is slow.
+    It is not evaluated if there are more steps than output times, which may then miss slow phases.
     """
     r = x.result
     unknown = x.works or r.exchanged or r.bulk or r.pieces
@@ -362,12 +365,12 @@ def lag_warning(x: EnergyBudget) -> str:
 
 
 def _speed_excess(x: EnergyBudget) -> np.ndarray:
-    """Part by which it is too fast at every output time, dE / 2T: half of what moves at most."""
+    """Return the relative speed error at every output time, dE / 2T, limited to 1/2."""
     return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
 
 
 def _turning_points(x: EnergyBudget) -> np.ndarray:
-    """Rows about turning points, where a motion comes back: its speed is off by much there, its time is not."""
+    """Return rows around turning points: the speed error is large there, the time error is not."""
     slow, v = x.kinetic < TURNING_POINT * x.kinetic.max(), x.result.v
     edges = np.flatnonzero(np.diff(np.r_[False, slow, False]))
     out = np.zeros(len(slow), bool)

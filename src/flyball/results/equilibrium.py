@@ -21,22 +21,21 @@ STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_PART = "sticks", "smooth", "at
 
 @dataclass(frozen=True)
 class Touch:
-    """A closed contact, or a stop that is reached, of a mechanism at rest.
+    """A closed contact, or an active stop, of a mechanism at rest.
 
     Attributes
     ----------
     name : str
-        ``"block-floor"``, with a number where there are several; of a stop its own name.
+        ``"block-floor"``, with a number if there are several; of a stop its own name.
     state : str
-        ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, where any more would make it slide; or
-        ``"about to part"``, which carries nothing.
+        ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, on the verge of sliding; or ``"about
+        to part"``, without load.
     normal : float
-        Force that presses [N]; of a stop its effort [N or N m]; of friction in a joint, a brake or clutch the most that
-        it bears.
+        Normal force [N]; of a stop its effort [N or N m]; of joint friction, a brake or clutch its capacity.
     tangential : float [N]
         Friction force.
     used : float
-        Friction force in parts of what friction bears; 0 without friction.
+        Friction force relative to the friction limit; 0 without friction.
     gap : float [m]
         Distance of the surfaces; below 0 they overlap.
     """
@@ -56,51 +55,50 @@ class Touch:
 
 BY_EIGENVALUES, BY_MULTIPLIERS = "eigenvalues of the closed loop", "multipliers of the closed loop, sample by sample"
 STABLE, MARGINAL, UNSTABLE, NOT_JUDGED = "stable", "marginal", "unstable", "not judged"
-MAX_CONTACTS = 12  # contacts in a text
+MAX_CONTACTS = 12  # number of contacts in a text
 
 
 @dataclass
 class Equilibrium:
     """A mechanism at rest under its forces, or in steady motion.
 
-    ``equilibrium["A.fx"]`` is what a curve of the result is there.
+    ``equilibrium["A.fx"]`` is the value of a curve of the result.
 
     Attributes
     ----------
     stability : str
-        ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness,
-        in which reactions turn with the bodies; where forces have no potential, or drive motions on, by the
-        eigenvalues too; with controllers by those of the closed loop alone. With contact it is judged while closed
-        contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide, and ``"not judged"``
-        where ``notes`` say why.
+        ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness
+        (reactions turn with the bodies); for forces without potential, or with negative damping, also by the
+        eigenvalues; with controllers by those of the closed loop alone. With contact, closed contacts are assumed to
+        stay closed and to stick: ``"marginal"`` if one is about to open or to slide, and ``"not judged"`` for the
+        reason in ``notes``.
     judged_by : str
-        What says so, with controllers.
+        The criterion, with controllers.
     freedoms : tuple of str
-        Coordinates that the stiffness belongs to.
+        Coordinates of the stiffness.
     stiffness : ndarray (f, f)
-        Of those; with controllers while their states, and what sampled ones hold, stay as they are. It then says
-        nothing of stability.
+        Stiffness matrix; with controllers for constant states and held signals. It then does not decide stability.
     weakest : dict
-        Direction of least stiffness: coordinate -> part.
+        Direction of lowest stiffness: coordinate -> component.
     least : float
-        That stiffness: energy per square of the mechanism's length or radian, as part of what acts.
+        That stiffness: energy per square of the mechanism's length or radian, relative to the largest force term.
     preload : dict
-        Force -> what had to be added to its law [its unit].
+        Force -> offset added to its law [its unit].
     speeds : dict
         Coordinate -> speed [rad/s or m/s], of a steady motion.
     unbalanced : float
-        The largest force left, as part of what acts.
+        The largest residual force, relative to the largest force term.
     method : str
-        What found it.
+        Method that found it.
     kinks : tuple of str
-        Forces with another slope on the other side of this very place, in words; stability is then judged from all
-        sides, and ``stiffness`` and ``least`` are of the side with the least.
+        Descriptions of forces with different one-sided slopes at this position; stability is then judged for all sides,
+        and ``stiffness`` and ``least`` belong to the side with the lowest stiffness.
     result : Result
         Everything by name, as a result with one time; forces of contacts are in ``result.contacts``.
     touching : tuple of Touch
-        What every closed contact does, and every stop that is reached.
+        State of every closed contact, and of every active stop.
     notes : tuple of str
-        What has to be said besides, with contact.
+        Further remarks, with contact.
     """
 
     t: float
@@ -122,7 +120,7 @@ class Equilibrium:
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
-        """A curve's value there, or a part of the result."""
+        """Return a curve's value, or a part of the result."""
         found = self.result[name]
         if not isinstance(found, np.ndarray):
             return found
@@ -162,7 +160,7 @@ class Equilibrium:
         """Everything as plain numbers and names, all curves included."""
         kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
-        out["least"] = self.least if math.isfinite(self.least) else None  # nothing is free: JSON knows no infinity
+        out["least"] = self.least if math.isfinite(self.least) else None  # JSON has no infinity
         out |= {"judged_by": self.judged_by} if self.judged_by else {}
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
         out |= {"touching": [asdict(k) for k in self.touching], "notes": list(self.notes)}
@@ -170,13 +168,13 @@ class Equilibrium:
         return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}
 
     def html(self) -> str:
-        """The mechanism where it is with the verdict beside it, as a page's text."""
+        """Return a page with the equilibrium position and the stability."""
         from ..view.animation import equilibrium_page
 
         return equilibrium_page(self)
 
     def to_html(self, path: str | os.PathLike) -> None:
-        """Write the page that shows the mechanism where it is, and the verdict."""
+        """Write the page with the equilibrium position and the stability."""
         write_file(path, self.html(), PAGE)
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""Equilibria over values of a parameter: branches, and where they turn, branch or lose stability."""
+"""Equilibria over values of a parameter, and the jumps between their branches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .wording import number_text
 
 @dataclass(frozen=True)
 class Jump:
-    """Where a series left its branch: at ``value`` the equilibrium ``before`` ceases to be, or to be stable."""
+    """A jump from a branch: at ``value`` the equilibrium ``before`` ceases to exist, or to be stable."""
 
     value: float
     before: Equilibrium = field(repr=False)
@@ -34,7 +34,7 @@ class EquilibriumSeries:
     values : ndarray (n,)
     equilibria : list of Equilibrium
     jumps : list of Jump
-        Where the branch ended, or became unstable and was left, and where the forces then led.
+        Points where the branch ended, or became unstable and was left, and the equilibria reached then.
     """
 
     name: str
@@ -50,14 +50,14 @@ class EquilibriumSeries:
 
     @property
     def least(self) -> np.ndarray:
-        """Least stiffness at each value, as part of what acts; with controllers while their states are held."""
+        """Lowest stiffness at each value, relative to the largest force term; with controllers for constant states."""
         return np.array([e.least for e in self.equilibria])
 
     def __len__(self) -> int:
         return len(self.equilibria)
 
     def __getitem__(self, which: str | int) -> Any:
-        """A curve over the values by its name, or an equilibrium by its number."""
+        """Return a curve over the values by name, or an equilibrium by its index."""
         if isinstance(which, str):
             return self.channel(which)[1]
         return self.equilibria[which]
@@ -91,7 +91,7 @@ class EquilibriumSeries:
         return out
 
     def telling(self) -> list[str]:
-        """Names of the curves that say most: coordinates of the freedoms, else of the first body; at most three."""
+        """Up to three of the most important curves: coordinates of the degrees of freedom, else of the first body."""
         known = self.equilibria[0].result.channels() if self.equilibria else {}
         names = [f for f in self.equilibria[0].freedoms if f in known] if self.equilibria else []
         return (names or [n for n in known if n.partition(".")[2] in ("x", "y", "z", "angle")])[:3]

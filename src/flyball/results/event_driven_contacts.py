@@ -1,4 +1,4 @@
-"""Contacts of a motion that was integrated from event to event: which touched, where, and with which forces."""
+"""Contacts of a motion with event-driven integration: closed contact points, and their forces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ContactHistory:
-    """What happens at one place: how it is, and the force on the second side, at every output time."""
+    """State of one contact point, and the force on the second side, at every output time."""
 
     def __init__(self, result: Result, element: Touch) -> None:
         self._result, self._s, self.element = result, result.values.structure, element
@@ -29,22 +29,22 @@ class ContactHistory:
 
     @property
     def known(self) -> bool:
-        """Whether the motion was computed with it."""
+        """Return whether the motion was computed with it."""
         return bool(self._switches) and self._result.phases is not None
 
     def _term(self, row: int) -> int:
-        """The term of a row."""
+        """Return the term of a row."""
         return next(k for k, t in enumerate(self._s.terms) if t.row == row)
 
     @cached_property
     def _rows(self) -> list[tuple[int, tuple]]:
-        """(row, what its formula gives) of the gap and of every slip."""
+        """Return (row, result of its formula) of the gap and of every slip."""
         rows = [self._s.switches[k].row for k in self._switches]
         return [(row, term_over_time(self._result, self._term(row))[2]) for row in rows]
 
     @cached_property
     def gap(self) -> np.ndarray:
-        """How far apart the sides are [m]."""
+        """Distance of the sides [m]."""
         return self._result.measured.quantity(self._s.switches[self._switches[0]].measured)[0]
 
     @cached_property
@@ -59,30 +59,30 @@ class ContactHistory:
 
     @cached_property
     def closed(self) -> np.ndarray:
-        """Whether the sides touch."""
+        """Whether the contact is closed."""
         return self._result.phases.mode[self._switches[0]] != OFF  # type: ignore[union-attr]
 
     @cached_property
     def slides(self) -> np.ndarray:
-        """Whether they slide."""
+        """Whether it slides."""
         if len(self._switches) < 2:
             return self.closed
         return self.closed & (self._result.phases.mode[self._switches[1]] == OFF)  # type: ignore[union-attr]
 
     @cached_property
     def tangents(self) -> np.ndarray:
-        """Directions of the slips, (slips, n, 3)."""
+        """Directions of the slip rows, (slips, n, 3)."""
         return np.array([np.stack(x[1], axis=1) for _, x in self._rows[1:]]).reshape(-1, len(self._result.t), 3)
 
     @cached_property
     def slip(self) -> np.ndarray:
-        """How fast the second side slides over the first along the tangents [m/s], (slips, n)."""
+        """Sliding velocity of the second side along the tangents [m/s], (slips, n)."""
         of = [self._s.switches[k].measured for k in self._switches[1:]]
         return np.array([self._result.measured.quantity(m)[1] for m in of]).reshape(-1, len(self._result.t))
 
     @cached_property
     def sliding(self) -> np.ndarray:
-        """Friction of what slides, on the second side [N], (n, 3)."""
+        """Sliding friction on the second side [N], (n, 3)."""
         d = self._result.phases.sigma[self._switches[1:]] + 0.0 * self.slip  # type: ignore[union-attr]
         if len(d) > 1:
             pace = float(characteristic_speed(self._result.values.system).real)
@@ -93,7 +93,7 @@ class ContactHistory:
 
     @cached_property
     def sticking(self) -> np.ndarray:
-        """Friction of what sticks, on the second side [N], (n, 3)."""
+        """Static friction on the second side [N], (n, 3)."""
         held = [self._result.multipliers[:, row] for row, _ in self._rows[1:]]
         return np.einsum("in,inc->nc", np.array(held).reshape(-1, len(self._result.t)), self.tangents)
 
@@ -104,20 +104,20 @@ class ContactHistory:
 
     @cached_property
     def point(self) -> np.ndarray:
-        """Midway between the sides [m], (n, 3)."""
+        """Point midway between the sides [m], (n, 3)."""
         _, M, _ = term_over_time(self._result, self._term(self._rows[0][0]))
         p = np.stack([x + self._result.records.zeros() for x in M[0]], axis=1)
         return p - (self.element.radius + 0.5 * self.gap)[:, None] * self.normal
 
     @property
     def power(self) -> np.ndarray:
-        """Of its friction [W]."""
+        """Power of its friction [W]."""
         u = np.einsum("in,inc->nc", self.slip, self.tangents)
         return dot(tuple(self.sliding.T), tuple(u.T))
 
 
 def event_driven_contacts(result: Result) -> Contacts | None:
-    """Every place that is closed, at every output time; None if the motion was computed without."""
+    """Return every closed contact point at every output time; None if the motion was computed without."""
     if result.pieces:
         for p in result.pieces:
             p.contacts = event_driven_contacts(p)

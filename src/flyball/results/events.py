@@ -20,27 +20,28 @@ if TYPE_CHECKING:
 
     from .result import Result
 
-MAX_ROWS = 20  # lines of a printed table
+MAX_ROWS = 20  # number of lines of a printed table
 TABLE_HEAD = ("t [s]", "name", "kind", "done", "lost [J]")
 
 
 @dataclass(frozen=True)
 class EventRecord:
-    """What happened at one instant.
+    """An event at one instant.
 
     Attributes
     ----------
     t : float [s]
     name : str
-        Of the event or element; of several at once with commas between them.
+        Name of the event or element; of simultaneous ones separated by commas.
     kind : str
-        ``"event"`` where the model's `Event` says it, else what it was: ``"impact"``, ``"stop"``, ``"stick"``, ...
+        ``"event"`` for an `Event` of the model, else its kind: ``"impact"``, ``"stop"``, ``"stick"``, ...
     done : tuple of str
-        What was done, in words.
+        Descriptions of the actions.
     lost : float [J]
-        Energy that impacts and sudden locking took.
+        Energy lost in impacts and sudden locking.
     impulses : mapping
-        Element -> impulse [N s] or [N m s]: a number along its coordinate, or components; see `reactions.EventImpulses`.
+        Element -> impulse [N s] or [N m s]: a number along its coordinate, or components; see
+        `reactions.EventImpulses`.
     before, after : Moment, optional
         The motion just before and after: ``happening.after["block.vx"]``.
     """
@@ -51,9 +52,9 @@ class EventRecord:
     done: tuple[str, ...] = ()
     lost: float = 0.0
     impulses: Mapping[str, Any] = field(default_factory=dict)
-    before: Any = field(default=None, repr=False, compare=False)  # state vectors until a result has it
+    before: Any = field(default=None, repr=False, compare=False)  # state vectors, until the result is attached
     after: Any = field(default=None, repr=False, compare=False)
-    tables: Any = field(default=None, repr=False, compare=False)  # before and after, where a parameter was set
+    tables: Any = field(default=None, repr=False, compare=False)  # parameters before and after, if one was set
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the states."""
@@ -74,9 +75,9 @@ class EventRecord:
 
 
 class Events(Sequence):
-    """All that happened at instants of a motion, in the order of time; ``run.events["hit"]`` are those of a name.
+    """All events of a motion, in the order of time; ``run.events["hit"]`` are those of a name.
 
-    ``of`` is the result that they are of.
+    ``of`` is their result.
     """
 
     def __init__(self, records: Iterable[EventRecord], of: Result | None = None) -> None:
@@ -93,18 +94,18 @@ class Events(Sequence):
     @overload
     def __getitem__(self, which: slice | str) -> Events: ...
     def __getitem__(self, which: int | slice | str) -> EventRecord | Events:
-        """One by its number, several by a slice, or those of a name or kind."""
+        """Return one by its index, several by a slice, or those of a name or kind."""
         if isinstance(which, str):
             return self.of(which)
         return Events(self._all[which], self._of) if isinstance(which, slice) else self._all[which]
 
     def of(self, name: str) -> Events:
-        """Those of an event, element or kind of this name; none if there is one, and it never happened.
+        """Return those of an event, element or kind of this name; empty if it exists but never occurred.
 
         Raises
         ------
         ModelError
-            If there is nothing of that name; the message lists what happened.
+            If nothing has that name; the message lists the names that occurred.
         """
         found = [h for h in self._all if h.kind == name or name in h.name.split(", ")]
         if not found and name not in EVENT_KINDS and name not in (able := self._able()):
@@ -114,19 +115,19 @@ class Events(Sequence):
         return Events(found, self._of)
 
     def _able(self) -> set[str]:
-        """Names of all that might have happened."""
+        """Return the names of all possible events."""
         if self._of is None:
             return set()
         held = self._of.phases.all[0].values.structure.switches if self._of.phases is not None else ()
         return {e.name for e in self._of.model.elements()} | {x.switch.label or x.element.name for x in held}
 
     def names(self) -> list[str]:
-        """Names of what happened, each once, in the order of time."""
+        """Names of the events that occurred, each once, in the order of time."""
         return list(dict.fromkeys(part for h in self._all for part in h.name.split(", ")))
 
     @property
     def t(self) -> np.ndarray:
-        """When, (n,) [s]."""
+        """Times, (n,) [s]."""
         return np.array([h.t for h in self._all])
 
     @property
@@ -135,7 +136,7 @@ class Events(Sequence):
         return np.array([h.lost for h in self._all])
 
     def counts(self) -> dict[str, int]:
-        """How often each happened, by name."""
+        """Number of occurrences, by name."""
         return {name: sum(name in h.name.split(", ") for h in self._all) for name in self.names()}
 
     def as_dict(self) -> list[dict[str, Any]]:
@@ -143,7 +144,7 @@ class Events(Sequence):
         return [h.as_dict() for h in self._all]
 
     def summary(self) -> str:
-        """How many, and how often each; empty where nothing happened."""
+        """Return the number of events, and how often each occurred; empty if there are none."""
         if not self._all:
             return ""
         told = shortened_list((f"{name} {n} times" if n > 1 else name for name, n in self.counts().items()), 90)
@@ -161,7 +162,7 @@ class Events(Sequence):
         return pd.DataFrame(rows, columns=None if rows else ["t", "name", "kind", "done", "lost"])
 
     def _table(self) -> tuple[list[tuple[str, ...]], str]:
-        """Rows of the printed table, and what is left out of it."""
+        """Return the rows of the printed table, and what is left out of it."""
         shown = self._all if len(self._all) <= MAX_ROWS else (*self._all[: MAX_ROWS - 1], self._all[-1])
         rows: list[tuple[str, ...]]
         rows = [(f"{h.t:.6g}", h.name, h.kind, "; ".join(h.done), f"{h.lost:.4g}" if h.lost else "") for h in shown]
@@ -193,7 +194,7 @@ class Events(Sequence):
 
 
 def _impulse_columns(impulses: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """Impulses by the names of their columns: a number, or each component."""
+    """Return impulses by their column names: a number, or each component."""
     for name, x in impulses.items():
         parts = (
             dict(x)
@@ -206,7 +207,7 @@ def _impulse_columns(impulses: Mapping[str, Any]) -> Iterator[tuple[str, float]]
 
 
 def with_moments(records: list[EventRecord], result: Result) -> Iterator[EventRecord]:
-    """With states that can be read by name, by the parameters of their time."""
+    """Return events with states that can be read by name, with the parameters of their time."""
     now = next((h.tables[0] for h in records if h.tables is not None), result.values)
     since, came = np.nan, None
     for h in records:

@@ -1,12 +1,12 @@
 """Result files, labelled datasets and tables: written from a result, and read back without simulating.
 
-A result file is NetCDF 4. Its root holds the labelled quantities, for other programs; its group ``flyball`` holds
-what the motion was computed with, bit for bit, from which the result is rebuilt, and a checksum of it. Texts and
-arrays of that group lie in two variables, since HDF5 takes more than a millisecond for each variable.
+A result file is NetCDF 4. Its root contains the labelled quantities, for other programs; its group ``flyball`` contains
+the bit-exact data from which the result is rebuilt, and a checksum of them. Texts and arrays of that group are stored
+in two variables, since HDF5 takes more than a millisecond for each variable.
 
-Behind the end of what NetCDF reads stands a checksum of the whole file, so that nothing reads a damaged file:
-HDF5 may then not come back. A program that writes the file anew drops that one and keeps the other. A file that
-was changed after it was written (a copy that broke off, a failing disk) is refused.
+A checksum of the whole file follows the end of the NetCDF data, so that a damaged file is never opened: HDF5 may hang
+on it. A program that rewrites the file drops this checksum and keeps the other. A file that was changed after it was
+written (an incomplete copy, a failing disk) is refused.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ if TYPE_CHECKING:
 
 
 TEXTS_VARIABLE, NUMBERS_VARIABLE = "texts", "numbers"
-MAX_CONCATENATED = 1 << 20  # numbers that are put together before they are written
+MAX_CONCATENATED = 1 << 20  # size of arrays that are combined before writing
 
 
 def text_type() -> Any:
-    """Of texts of any length in a file."""
+    """Return the type of variable-length texts in a file."""
     import h5py
 
     return h5py.string_dtype()
@@ -72,7 +72,7 @@ def write_group(group: Any, texts: Mapping[str, str], arrays: Mapping[str, np.nd
 
 
 def read_group(group: Any) -> dict[str, Any]:
-    """Texts and arrays of a group; from before format 4 each is a variable by itself."""
+    """Read texts and arrays of a group; before format 4 each is a separate variable."""
     found = {name: _read_variable(x) for name, x in group.variables.items()}
     if NUMBERS_VARIABLE not in found:
         return found
@@ -97,7 +97,7 @@ StoredData = dict[str, Any]
 
 
 def pack_contacts(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
-    """Texts and arrays; none where there is neither contact nor a set of bodies."""
+    """Return contacts and sets of bodies as texts and arrays; empty if there are none."""
     texts: dict[str, str] = {}
     arrays: dict[str, np.ndarray] = {}
     if result.bulk:
@@ -116,7 +116,7 @@ def pack_contacts(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]
 
 
 def unpack_contacts(stored: StoredData, result: Result) -> None:
-    """Give a result what its file holds of contacts and sets.
+    """Restore contacts and sets of a result from its file.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def unpack_contacts(stored: StoredData, result: Result) -> None:
 
 
 def pack_events(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
-    """Texts and arrays; none where nothing happened. States before and after are rows, nan where they are not kept."""
+    """Return events as texts and arrays; empty if there are none. States before and after are rows, nan if unknown."""
     if not len(result.events):
         return {}, {}
     states = {
@@ -176,7 +176,7 @@ def _state_rows(moments: list[Any], n: int) -> np.ndarray:
 
 
 def unpack_events(stored: dict[str, Any], result: Result) -> None:
-    """Give a result what its file holds of events.
+    """Restore the events of a result from its file.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def unpack_events(stored: dict[str, Any], result: Result) -> None:
 
 
 def _event_fields(one: dict[str, Any], known: bool) -> dict[str, Any]:
-    """What an event is made of; ``known``: with its states, by which all impulses are found."""
+    """Return the fields of an event; ``known``: with its states, from which all impulses are computed."""
     struck = one.pop("struck", None)
     if struck is not None and known:
         one["impulses"] = EventImpulses(struck["own"], np.array(struck["rows"]), tuple(map(tuple, struck["blows"])))
@@ -205,7 +205,7 @@ def _event_fields(one: dict[str, Any], known: bool) -> dict[str, Any]:
 
 
 def _event_tables(stored: dict[str, Any], side: str, result: Result) -> list[Values]:
-    """The mechanism with the parameters of each event, before or after it."""
+    """Return the mechanism with the parameters of each event, before or after it."""
     names, rows = list(result.model.parameters), stored.get(f"events_{side}_parameters")
     if rows is None:
         return [result.values] * len(stored[f"events_{side}"])
@@ -222,7 +222,7 @@ PHASE_ARRAYS = ("rows", "lost", "given", "switch", "end")
 
 
 def pack_phases(result: Result) -> dict[str, np.ndarray]:
-    """Arrays by name, none that are empty; none at all where nothing can switch."""
+    """Return phases as arrays by name, without empty ones; none if nothing can switch."""
     if result.phases is None:
         return {}
     every = result.phases.all
@@ -237,12 +237,12 @@ def pack_phases(result: Result) -> dict[str, np.ndarray]:
 
 
 def has_switches(stored: dict[str, Any]) -> bool:
-    """Whether the result of a file was computed with rows that have modes."""
+    """Return whether a stored result was computed with rows that have modes."""
     return PHASE_PREFIX + "rows" in stored
 
 
 def unpack_phases(stored: dict[str, Any], result: Result) -> None:
-    """Give a result what its file holds of stretches.
+    """Restore the phases of a result from its file.
 
     Raises
     ------
@@ -277,14 +277,14 @@ def unpack_phases(stored: dict[str, Any], result: Result) -> None:
 
 OWN_GROUP = "flyball"
 SEAL_MARK = b"\nflyball SHA-256 "
-RESULT_FORMAT = 4  # 1: before joint coordinates, 2: before checksums, 3: each text and array a variable by itself
+RESULT_FORMAT = 4  # 1: before joint coordinates, 2: before checksums, 3: each text and array a variable of its own
 MOTION_ARRAYS = ("t", "q", "v", "vdot", "multipliers", "states")
-MAX_LABELLED = 3000  # labelled quantities in a file; HDF5 takes more than a millisecond for each
+MAX_LABELLED = 3000  # largest number of labelled quantities in a file; HDF5 takes more than a millisecond for each
 SLASH_SUBSTITUTE = "\N{DIVISION SLASH}"  # a name must not hold "/" in a NetCDF file
 
 
 def to_xarray(result: Result) -> xarray.Dataset:
-    """All quantities as a dataset: ``ds["crank.position"]`` has the dimensions time and component.
+    """Return all quantities as a dataset: ``ds["crank.position"]`` has the dimensions time and component.
 
     Units are in each variable's ``attrs["units"]``.
     """
@@ -306,7 +306,7 @@ def _file_attributes(result: Result) -> dict[str, str]:
 
 
 def to_dataframe(result: Result) -> pandas.DataFrame:
-    """All curves as columns ``"slider.x"``; time [s] as index; units in ``attrs["units"]``."""
+    """Return all curves as columns ``"slider.x"``; time [s] as index; units in ``attrs["units"]``."""
     import pandas as pd
 
     channels = result.channels()
@@ -316,7 +316,7 @@ def to_dataframe(result: Result) -> pandas.DataFrame:
 
 
 def to_csv(result: Result, path: str | os.PathLike) -> None:
-    """All curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
+    """Write all curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
     channels = result.channels()
     header = [f"{TIME_LABEL} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
     columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
@@ -332,15 +332,15 @@ def write_table(path: str | os.PathLike, header: Sequence[str], rows: Iterable[S
 
 
 def save(result: Result, path: str | os.PathLike, *, with_labelled: bool = True) -> None:
-    """Write everything, the model included, to one NetCDF file; the labelled quantities for other programs if told."""
+    """Write everything, the model included, to one NetCDF file; on request with labelled quantities."""
     folder = Path(path).parent
     write_file(path, sealed_file_bytes(lambda file: _write_result(result, file, with_labelled, folder)))
 
 
 def sealed_file_bytes(fill: Callable[[Any], None]) -> memoryview:
-    """The bytes of a NetCDF file that a function fills, with their checksum behind the end.
+    """Return the bytes of a NetCDF file that a function fills, followed by their checksum.
 
-    In memory: where HDF5 meets a full disk it ends the process by a segmentation fault.
+    It is written in memory: on a full disk HDF5 would crash the process by a segmentation fault.
     """
     import h5netcdf
 
@@ -371,7 +371,7 @@ def _write_result(result: Result, file: Any, with_labelled: bool, folder: Path) 
 
 
 def _uncached_copy(result: Result) -> Result:
-    """The same, of which nothing was worked out yet: what is worked out of it to be written goes with it."""
+    """Return a copy without cached data; data computed from it for writing are discarded with it."""
     out = copy.copy(result)
     for name, x in vars(type(result)).items():
         if isinstance(x, cached_property):
@@ -381,7 +381,7 @@ def _uncached_copy(result: Result) -> Result:
 
 
 def is_sealed(path: Path) -> bool | None:
-    """Whether a file is as it was written; None if it has no checksum behind its end."""
+    """Return whether a file is unchanged since it was written; None if it has no checksum."""
     size = path.stat().st_size - len(SEAL_MARK) - 64
     if size < 0:
         return None
@@ -392,7 +392,7 @@ def is_sealed(path: Path) -> bool | None:
 
 
 def file_hash(path: Path, size: int) -> str:
-    """SHA-256 of the first bytes of a file."""
+    """Return the SHA-256 of the first ``size`` bytes of a file."""
     digest = hashlib.sha256()
     with open(path, "rb") as file:
         while size > 0 and (part := file.read(min(size, 1 << 20))):
@@ -402,7 +402,7 @@ def file_hash(path: Path, size: int) -> str:
 
 
 def data_checksum(stored: Mapping[str, Any], kind: int = RESULT_FORMAT) -> str:
-    """SHA-256 of texts and arrays by name, in an order and with bytes that do not depend on the machine."""
+    """Return the SHA-256 of texts and arrays by name, in an order and byte order independent of the machine."""
     digest = hashlib.sha256(str(kind).encode())
     for name in sorted(stored):
         value = stored[name]
@@ -420,7 +420,7 @@ def _variable_name(name: str) -> str:
 
 
 def _write_solution(result: Result, group: Any, folder: Path) -> None:
-    """The arrays as they are, the model as its file's text, parameters as used, health as JSON."""
+    """Write the arrays exactly, the model as the text of its file, parameters as used, health as JSON."""
     from .. import __version__
     from ..model.toml_file import dumps
 
@@ -449,13 +449,13 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
     group.attrs["checksum"] = data_checksum(texts | arrays)
 
 
-# What every part of a result is called in files and datasets: name, dimensions, unit, values.
+# Every part of a result in files and datasets: name, dimensions, unit, values.
 
 
 TIME_LABEL, COMPONENT_DIMENSION, QUATERNION_DIMENSION = "time", "component", "quaternion_component"
 
 
-MAX_SET_VALUES = 1_000_000  # members of a set times output times that are labelled
+MAX_SET_VALUES = 1_000_000  # largest product of set members and output times that is labelled
 
 
 class LabelledQuantity(NamedTuple):
@@ -477,14 +477,14 @@ def dimension_labels(result: Result) -> dict[str, list[str]]:
 def labelled_quantities(result: Result, max_count: float = np.inf, forget: bool = False) -> Iterator[LabelledQuantity]:
     """Every quantity of the result: ``"crank.position"``, ``"A.force"``, ``"energy.total"`` and so on.
 
-    Energies only, where the mechanism has so many parts that there would be more than ``max_count`` quantities. With
-    ``forget`` the result does not keep what was worked out for a part: of all parts at once that is much memory.
+    If there would be more than ``max_count`` quantities, energies only. With ``forget`` data cached for a part are
+    discarded, since those of all parts together need much memory.
     """
     tables = {name: quantities(result.model, name) for name in result.parts()}
     count = sum(x.array for table in tables.values() for x in table.values())
     for name in tables if count <= max_count else (ENERGY,):
         if name in result.bulk and len(result.t) * len(result.bulk[name]) > MAX_SET_VALUES:
-            continue  # its arrays are in the file once, for flyball
+            continue  # the arrays are stored once, for flyball
         view = result[name]
         for what, x in tables[name].items():
             if x.array:
@@ -506,13 +506,13 @@ def _dimensions(what: str, values: np.ndarray) -> tuple[str, ...]:
 
 
 def _set_dimensions(name: str, what: str, values: np.ndarray) -> tuple[str, ...]:
-    """Of a set of bodies: times, members, and components if there are some."""
+    """Return the dimensions of a set of bodies: times, members, and components if there are any."""
     own = (TIME_LABEL, f"{name}_member")
     return own if values.ndim == 2 else (*own, *_dimensions(what, values[:, 0])[1:])
 
 
 def _body_note(view: Any, what: str) -> str:
-    """On which body a reaction or force acts, and what redundancy leaves of it undetermined."""
+    """Return a note on the body on which a reaction or force acts, and on its undetermined components."""
     if what not in ("force", "torque"):
         return ""
     if isinstance(view, JointView):

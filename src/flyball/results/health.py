@@ -12,7 +12,7 @@ import numpy as np
 from .wording import number_text, tuple_text
 
 PASSED_THROUGH = (
-    0.5  # overlap, over the size of the smallest body, from which on bodies are pushed out on the other side
+    0.5  # overlap, relative to the size of the smallest body, above which bodies may be pushed out on the other side
 )
 
 
@@ -23,33 +23,33 @@ class ContactHealth:
     Attributes
     ----------
     solver : str
-        What solved the contacts, and why it was chosen.
+        Contact solver, and why it was chosen.
     impacts : str
-        Law of impacts, and whether they come together or one after the other.
+        Impact law, and whether impacts are simultaneous or sequential.
     most : int
-        Contacts in one step, at most.
+        Largest number of contacts in one step.
     worst_overlap : float [m]
         Deepest overlap after any step.
     overlap_at_start : float [m]
         Deepest overlap as described.
     residual : float [m/s]
-        Largest velocity left in any solve that should vanish.
+        Largest residual velocity of any solve.
     force_residual : float
-        Largest part of an impulse that was left, over the largest impulse of its solve.
+        Largest residual impulse relative to the largest impulse of its solve.
     tolerance : float [m/s]
-        What the residual was asked to be.
+        Tolerance of the residual.
     solves, iterations, unconverged : int
-        How many solves of velocities there were, all iterations, and how many solves were cut off with more left than
-        what gravity makes in a step.
+        Number of velocity solves, of all iterations, and of solves stopped with a residual larger than the velocity
+        that gravity adds in a step.
     worst_at : float or None [s]
         Time of the largest residual.
     size : float [m]
-        Of the smallest body that touches, which overlaps are compared with.
+        Size of the smallest body in contact, the reference for overlaps.
     halved, reduced, impacted, endless : int
-        Steps that were divided; impacts that gave back less than their law says, of how many; steps in which the
-        sequence of impacts did not end.
+        Number of divided steps; of impacts with less rebound than their law prescribes, and of all impacts; of steps in
+        which the sequence of impacts did not end.
     notes : tuple of str
-        What else has to be said: a law of impacts that was softened, a position without unique forces (Painleve).
+        Further remarks: a softened impact law, a position without unique forces (Painleve).
     """
 
     solver: str = ""
@@ -87,7 +87,7 @@ class ContactHealth:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Reasons to think that the motion is wrong."""
+        """Return reasons why the motion may be wrong."""
         out = []
         if self.endless:
             out.append(
@@ -103,7 +103,7 @@ class ContactHealth:
         return tuple(out)
 
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to look at the motion twice."""
+        """Return reasons to check the motion."""
         out = list(self.notes)
         if self.halved:
             out.append(
@@ -135,21 +135,21 @@ class ContactHealth:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> ContactHealth:
-        """What `as_dict` gave."""
+        """Restore from the result of `as_dict`."""
         return cls(**(data | {"notes": tuple(data.get("notes", ()))}))
 
 
-MAX_NAMED = 4  # elements that a line names
-WRITTEN_PRECISION = 1e-5  # part by which numbers written with some digits are off
+MAX_NAMED = 4  # number of elements in a line
+WRITTEN_PRECISION = 1e-5  # relative error of numbers written with few digits
 LARGE_VELOCITY = (
-    100.0  # times the largest velocity that is given or prescribed, above which one that is not given is said
+    100.0  # times the largest given or prescribed velocity: larger velocities that were not given are reported
 )
 VELOCITY_FIELDS = ("velocity", "angular_velocity")
 
 
 @dataclass(frozen=True)
 class InitialDeviation:
-    """A number of the description that the start does not have.
+    """A number of the description that the initial state does not satisfy.
 
     Attributes
     ----------
@@ -158,8 +158,8 @@ class InitialDeviation:
     what : str
         Its field: ``"position"``, ``"angle"``, ``"orientation"`` (quaternion), ``"velocity"``, ``"angular_velocity"``.
     given, got : tuple of float
-        As described, and where or how it starts: of the reference frame, along world axes. Of a velocity that is not
-        given, and is far larger than those that are, ``given`` is empty.
+        Value as described, and initial value: of the reference frame, in world axes. ``given`` is empty for a velocity
+        that is not given but far larger than the given ones.
     unit : str
     """
 
@@ -171,7 +171,7 @@ class InitialDeviation:
 
     @property
     def distance(self) -> float:
-        """How far apart these are [unit]; of orientations the angle of the turn between them [rad]."""
+        """Difference [unit]; of orientations the angle of the rotation between them [rad]."""
         a, b = np.array(self.given or (0.0,) * len(self.got)), np.array(self.got)
         if self.what == "orientation":
             # |a - b| = 2 |sin(theta / 4)|, |a + b| = 2 |cos(theta / 4)|; b and -b are the same orientation
@@ -199,17 +199,17 @@ class InitialDeviation:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> InitialDeviation:
-        """As `as_dict` gave it."""
+        """Restore from the result of `as_dict`."""
         return cls(**{**data, "given": tuple(data["given"]), "got": tuple(data["got"])})
 
 
 def _components_text(values: Sequence[float], size: float) -> str:
-    """Components in brackets, one number bare; what is rounding beside ``size`` is 0."""
+    """Return components in brackets, a single one bare; values negligible beside ``size`` are 0."""
     return number_text(values[0], size) if len(values) == 1 else tuple_text(values, 6, size)
 
 
 def changed_velocities(deviations: Sequence[InitialDeviation]) -> list[InitialDeviation]:
-    """Given velocities that were changed by more than the digits that users write, and others that are very large."""
+    """Return given velocities that changed by more than the digits that users write, and others that are very large."""
     return [
         d
         for d in deviations
@@ -219,10 +219,11 @@ def changed_velocities(deviations: Sequence[InitialDeviation]) -> list[InitialDe
 
 
 def velocity_not_allowed(d: InitialDeviation) -> str:
-    """What to say of a velocity that the start does not have, or has unasked, and what to do."""
+    """Return the message on an unsatisfied, or unexpected, initial velocity, with remedies."""
     if not d.given:
         return (
-            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the constraints need it to keep "
+            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the "
+            f"constraints need it to keep "
             f"given velocities as nearly as they can. Check those, and whether the position is near a dead centre, or "
             f"give {d.element!r} a velocity too"
         )
@@ -233,7 +234,7 @@ def velocity_not_allowed(d: InitialDeviation) -> str:
 
 
 def deviation_summary(deviations: Sequence[InitialDeviation]) -> str:
-    """One line: what assembly moved, and which velocities it could not keep."""
+    """Return one line: what assembly moved, and which velocities were changed."""
     moved: dict[str, InitialDeviation] = {}
     for d in deviations:
         if d.what not in VELOCITY_FIELDS and (d.element not in moved or d.what == "position"):
@@ -261,15 +262,15 @@ DEFERRED_FIGURES = (
     *("freedoms", "redundant", "redundant_cut", "undetermined", "energy_drift", "acceleration_violation", "creep"),
     *("warnings", "doubtful"),
 )
-"""Figures that are found when first asked for."""
+"""Figures that are computed on demand."""
 
 
 @dataclass
 class Health:
-    """Figures that tell whether a result can be trusted.
+    """Figures by which to judge whether a result can be trusted.
 
-    Those that take time to find (freedoms by rank, undetermined reactions, the energy balance, creep, warnings) are
-    found when first asked for.
+    Expensive ones (degrees of freedom by rank, undetermined reactions, the energy balance, creep, warnings) are
+    computed on demand.
     """
 
     success: bool
@@ -284,21 +285,19 @@ class Health:
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
-    method: str = ""  # by what a motion with contact was computed, and why
-    engine: str = ""  # "table-driven: why", or "made for this mechanism: where from"
-    crowd: int = 0  # bodies in sets, whose freedoms are not counted
-    remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
-    departures: tuple[
-        InitialDeviation, ...
-    ] = ()  # what of the description the start does not have: element, given, got
-    watched: str = ""  # how closely it was looked for events
-    compiling: float = 0.0  # of these seconds, those in which code was compiled or read: at first calls [s]
-    events: str = ""  # how many happened at instants, and how often each
-    contact: ContactHealth | None = None  # how contacts were solved, where there are any
+    method: str = ""  # method of a motion with contact, and why
+    engine: str = ""  # engine or generated code, and where the code comes from
+    crowd: int = 0  # bodies in sets, whose degrees of freedom are not counted
+    remarks: tuple[str, ...] = ()  # warnings of the analysis itself
+    departures: tuple[InitialDeviation, ...] = ()  # unsatisfied numbers of the description: element, given, got
+    watched: str = ""  # resolution of event detection
+    compiling: float = 0.0  # part of these seconds for compiling or loading code at first calls [s]
+    events: str = ""  # number of events, and how often each occurred
+    contact: ContactHealth | None = None  # contact solver, if there are contacts
 
     @property
     def _simulated(self) -> bool:
-        """Whether these are figures of a motion, rather than of one state."""
+        """Return whether these are figures of a motion, rather than of one state."""
         return "energy_drift" in self.late
 
     def _found(self, name: str) -> Any:
@@ -309,28 +308,28 @@ class Health:
 
     @property
     def status(self) -> str:
-        """How it ended: ``"done"``, or where and by which event of the model, or why it could not go on."""
+        """How it ended: ``"done"``, or the time and the event of the model that stopped it, or the error."""
         end = "done" if self.success and self._simulated and not self.ended_early else self.message
         return f"{end}, but doubtful" if self.success and self.doubtful else end
 
     @property
     def ended_early(self) -> bool:
-        """Whether an event of the model ended the motion, as asked for."""
+        """Whether an event of the model stopped the motion."""
         return self.success and self.message.startswith("ended at ")
 
     @property
     def freedoms(self) -> int:
-        """Freedoms by rank, at the start."""
+        """Degrees of freedom by rank, at the start."""
         return self._found("mobility").freedoms
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """Joints whose constraints depend on one another."""
+        """Joints with dependent constraints."""
         return self._found("mobility").redundant
 
     @property
     def redundant_cut(self) -> str:
-        """In words, whether `redundant` and `undetermined` are not complete, since the mechanism is too large."""
+        """Why `redundant` and `undetermined` are incomplete for a too large mechanism, if so."""
         return self._found("mobility").cut
 
     @property
@@ -340,34 +339,34 @@ class Health:
 
     @property
     def energy_drift(self) -> float:
-        """Largest deviation from the energy balance [J]; 0 where nothing was simulated, nan where not measured."""
+        """Largest deviation from the energy balance [J]; 0 if nothing was simulated, nan if not measured."""
         return self._found("energy_drift") if self._simulated else 0.0
 
     @property
     def balance(self) -> str:
-        """How well the energy balance closes, in words."""
+        """Description of the accuracy of the energy balance."""
         if math.isnan(self.energy_drift):
             return "not measured: it compares the energy at output times, and there are fewer than two"
         return f"{self.energy_drift:.2e} J largest deviation"
 
     @property
     def acceleration_violation(self) -> float:
-        """Largest |G vdot - gamma| at output times, relative to the terms that make it up."""
+        """Largest |G vdot - gamma| at output times, relative to its terms."""
         return self._found("acceleration_violation") if "acceleration_violation" in self.late else 0.0
 
     @property
     def creep(self) -> dict[str, tuple[float, float]]:
-        """Joint friction -> largest creep speed [m/s] and distance [m] while it should stick; see `diagnostics.friction_creep`."""
+        """Joint friction -> largest creep speed [m/s] and distance [m]; see `diagnostics.friction_creep`."""
         return self._found("creep") if "creep" in self.late else {}
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Reasons to think that the motion is not what its tolerance asks for: energy, accelerations, constraints."""
+        """Reasons why the motion may not satisfy its tolerance: energy, accelerations, constraints."""
         return tuple(self._found("doubtful")) if "doubtful" in self.late else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to look at the result twice: energy balance, violated constraints, undetermined loads, creep."""
+        """Reasons to check the result: energy balance, violated constraints, undetermined loads, creep."""
         found = self._found("warnings") if "warnings" in self.late else self.remarks
         own = self.contact.warnings() if self.contact else ()
         return tuple(dict.fromkeys((*found, *own)))

@@ -1,4 +1,4 @@
-"""Results of inverse dynamics: efforts of drives, reactions, and which components the motion determines."""
+"""Results of inverse dynamics: efforts of drives, reactions, and their determined components."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from .wording import number_text, range_text, with_unit
 if TYPE_CHECKING:
     from .result import Result
 
-STRESS_TOLERANCE = 1e-6  # part of the largest self-stress below which a component is left alone
-SINGULAR_TOLERANCE = 1e-4  # singular values below this part of their usual size are those of a singular position
+STRESS_TOLERANCE = 1e-6  # relative to the largest self-stress: smaller components are not affected
+SINGULAR_TOLERANCE = 1e-4  # relative to the usual singular values: smaller ones belong to a singular position
 SPATIAL, PLANE = ("fx", "fy", "fz", "tx", "ty", "tz"), ("fx", "fy", "torque")
 COMPONENT_INDEX = {"fx": 0, "fy": 1, "fz": 2, "tx": 3, "ty": 4, "tz": 5, "torque": 5}
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What drives a coordinate.
+    """The drive of a coordinate.
 
     Attributes
     ----------
     name, coordinate : str
-        The driver and what it drives.
+        The driver and its coordinate.
     unit : str
         Of the effort, ``"N"`` or ``"N*m"``.
     effort : ndarray (n,)
         Force or torque along the coordinate.
     rate : ndarray (n,)
-        Of the coordinate [m/s] or [rad/s].
+        Rate of the coordinate [m/s] or [rad/s].
     """
 
     name: str
@@ -49,22 +49,22 @@ class Drive:
 
     @property
     def power(self) -> np.ndarray:
-        """What it puts in [W], (n,)."""
+        """Power supplied [W], (n,)."""
         return self.effort * self.rate
 
 
 @dataclass(frozen=True)
 class Wrench:
-    """A reaction over time, with what is undetermined left out.
+    """A reaction over time, without undetermined components.
 
     Attributes
     ----------
     force, torque : ndarray (n, 3) [N], [N m]
-        nan where redundancy leaves a component undetermined.
+        nan if redundancy leaves a component undetermined.
     undetermined : ndarray (n, 6) of bool
         Components of force, then of torque.
     one : ndarray (n, 6)
-        One of the many reactions that there are: that of the least multipliers. No physics decides for it.
+        One of the possible reactions: the one with minimum-norm multipliers. It has no physical justification.
     """
 
     force: np.ndarray
@@ -80,9 +80,10 @@ class InverseDynamics:
     Attributes
     ----------
     result : Result
-        The motion. Its reactions are one choice where redundancy leaves them undetermined; those given here are not.
+        The motion. If redundancy leaves its reactions undetermined, they are one possible choice; this object marks
+        them instead.
     drives : dict
-        Driver, or what ``motion`` named -> `Drive`.
+        Driver, or name in ``motion`` -> `Drive`.
     determinacy : Determinacy
         Self-stresses at every time.
     """
@@ -98,7 +99,7 @@ class InverseDynamics:
 
     @property
     def efforts(self) -> dict[str, np.ndarray]:
-        """Effort of every drive [N] or [N m], (n,); nan where it is undetermined (in singular positions)."""
+        """Effort of every drive [N] or [N m], (n,); nan if undetermined (in singular positions)."""
         free = self.determinacy.efforts
         return {k: np.where(free.get(d.name, False), np.nan, d.effort) for k, d in self.drives.items()}
 
@@ -113,7 +114,7 @@ class InverseDynamics:
         ----------
         joint : str
         axes : ``"world"``, ``"joint"`` or the name of one of its two bodies
-            Axes of the components. What is determined depends on them.
+            Axes of the components. Which components are determined depends on them.
 
         Raises
         ------
@@ -130,10 +131,10 @@ class InverseDynamics:
         return self._told(one, stress)
 
     def together(self, *joints: str, on: str) -> Wrench:
-        """The sum of what joints do to a body: force, and torque about its mass centre, world axes.
+        """Return the sum of joint reactions on a body: force, and torque about its mass centre, world axes.
 
-        Sums may be determined where none of their parts is: two hinges of a door carry its weight together, however
-        they share it.
+        Sums may be determined although their terms are not: two hinges of a door carry its weight together, for any
+        distribution.
 
         Raises
         ------
@@ -188,7 +189,7 @@ class InverseDynamics:
 
     @property
     def undetermined(self) -> dict[str, np.ndarray]:
-        """What redundancy leaves undetermined at some time: ``"upper.fz"`` -> when, (n,) of bool; couplings too."""
+        """Return undetermined components: ``"upper.fz"`` -> times, (n,) of bool; of couplings too."""
         out = {k: np.isnan(x) for k, (_, x) in self.channels().items() if np.isnan(x).any()}
         couplings = {c.name for c in self.result.model.couplings if isinstance(c, Coupling)}
         return out | {k: free for k, free in self.determinacy.efforts.items() if k in couplings}
@@ -220,14 +221,14 @@ class InverseDynamics:
 
     @property
     def near_singular(self) -> np.ndarray:
-        """Times at which constraints all but lose their independence, or do, and at others not; (n,) of bool."""
+        """Times at which constraints become (almost) dependent, unlike at other times; (n,) of bool."""
         d = self.determinacy
         usual = np.median(d.least) if len(d.least) else 1.0
         fewest = d.count.min(initial=np.iinfo(np.int64).max)
         return (d.count > fewest) | (d.least < SINGULAR_TOLERANCE * usual)
 
     def _size(self, kind: str) -> float:
-        """The largest force (``"f"``) or torque (``"t"``) of any joint or drive, a torque by the length."""
+        """The largest force (``"f"``) or torque (``"t"``) of any joint or drive, a torque divided by the length."""
         (force, torque), length = self._sizes, self.result.values.length
         return max(force, torque / length) if kind == "f" else max(torque, force * length)
 

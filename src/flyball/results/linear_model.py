@@ -1,6 +1,6 @@
 """A linear model x' = A x + B u, y = C x + D u with names and units; in sparse descriptor form too.
 
-With sampled controllers the equations go from one sampling instant to the next.
+With sampled controllers the equations are discrete, from one sampling instant to the next.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Descriptor:
     """Sparse linear equations E z' = A z + B u, y = C z + D u (a descriptor system, of index 3).
 
     The states z are changes of all positions along the mechanism's velocities, of these velocities, of the
-    accelerations, and of the multipliers of the constraints: of such as do not depend on others. Inputs and outputs are
-    those of the `LinearModel`; inputs that move the mechanism stand in the constraints, and act through their rates.
+    accelerations, and of the multipliers of independent constraints. Inputs and outputs are those of the `LinearModel`;
+    inputs that move the mechanism enter the constraints, and act through their rates.
 
     Attributes
     ----------
@@ -41,16 +41,16 @@ class Descriptor:
     by_position : sparse (m, nv)
         V.
     kinematic, turning : sparse (nv, nv) [1/s]
-        N - H and H in x' = (N - H) x + v, v' = a - H v: how changes turn with the frame that they are seen from; zero
+        N - H and H in x' = (N - H) x + v, v' = a - H v, where H accounts for the rotation of the reference frame; zero
         at rest.
     forces, gaps : ndarray (nv, inputs), (m, inputs)
-        What inputs do in the equations of motion, on their left, and in the constraints.
+        Input matrices of the equations of motion (left side), and of the constraints.
     C : sparse (outputs, 3 nv + m)
     D : ndarray (outputs, inputs)
     coordinates, units : tuple of str
-        Of what each position is a change.
+        Coordinate of each position.
     rows : tuple of str
-        The element that each constraint is of.
+        Element of each constraint.
     scale : ndarray (nv,)
         1 for metres, 1 / length of the mechanism for radians.
     """
@@ -119,7 +119,7 @@ class Descriptor:
         return f"descriptor form: {3 * nv + m} states ({nv} positions, {m} constraints), {self.A.nnz} entries in A"
 
     def response(self, omega: Sequence[float], input: int, output: int) -> np.ndarray:
-        """Frequency response of an output by an input, by their places, at angular frequencies [rad/s]; complex, (n,).
+        """Frequency response of an output to an input, by their indices, at frequencies [rad/s]; complex, (n,).
 
         At an undamped pole it is infinite.
         """
@@ -150,7 +150,7 @@ class Descriptor:
         return complex((self.C[[k]] @ z)[0] + self.D[k, i])
 
     def nearest(self, count: int = 10, near: complex = 0.0) -> np.ndarray:
-        """Eigenvalues [1/s] next to a number, by shift and invert, (k,) complex: ``count`` and what belongs to them.
+        """Eigenvalues [1/s] nearest to a number, by shift and invert, (k,) complex: ``count`` and their conjugates.
 
         Parameters
         ----------
@@ -160,8 +160,8 @@ class Descriptor:
         Raises
         ------
         ModelError
-            If the mechanism moves, or has constraints on velocities: ask `LinearModel.eigenvalues`; or if these are
-            no such numbers.
+            If the mechanism moves, or has constraints on velocities (then use `LinearModel.eigenvalues`); or if the
+            arguments are invalid.
         AnalysisError
             If they are not found.
         """
@@ -183,7 +183,7 @@ class Descriptor:
         return QuadraticPencil(*(X.tocsr() for X in own)).nearest(count, near)[0]
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything as plain numbers and names; matrices by their entries that are not zero."""
+        """Return everything as plain numbers and names; matrices by their nonzero entries."""
         matrices = {k: _matrix_entries(getattr(self, k)) for k in ("E", "A", "B", "C")}
         return {"states": list(self.states), "units": list(self.units), **matrices, "D": self.D.tolist()}
 
@@ -193,13 +193,13 @@ def _matrix_entries(X: Any) -> dict[str, Any]:
     return {"shape": list(X.shape), "row": X.row.tolist(), "column": X.col.tolist(), "value": X.data.tolist()}
 
 
-MAX_EIGENVALUES = 10  # eigenvalues of a large mechanism in a text
-ROUNDING_PART = 1e-12  # part of a number below which its real or imaginary part is rounding
+MAX_EIGENVALUES = 10  # number of eigenvalues of a large mechanism in a text
+ROUNDING_PART = 1e-12  # relative to a complex number: smaller real or imaginary parts are rounding
 
 
 @dataclass
 class StateSpace:
-    """The equations with the constraints taken out; see the properties of `LinearModel`."""
+    """State-space equations with eliminated constraints; see the properties of `LinearModel`."""
 
     A: np.ndarray
     B: np.ndarray
@@ -217,11 +217,11 @@ class StateSpace:
 class LinearModel:
     """Linear equations of a mechanism about a state.
 
-    The states are changes of as many coordinates as there are freedoms, then changes of their rates. Where inputs move
-    the mechanism (drivers), the states are shifted by multiples of the inputs.
+    The states are changes of as many coordinates as there are degrees of freedom, then changes of their rates. If
+    inputs move the mechanism (drivers), the states are shifted by multiples of the inputs.
 
-    Of a mechanism that is ``large`` the sparse `descriptor` is made at once, and what is dense when it is first asked
-    for: that takes long and much memory.
+    For a ``large`` mechanism the sparse `descriptor` is computed at once, and dense matrices on demand: these take long
+    and much memory.
 
     Attributes
     ----------
@@ -229,20 +229,20 @@ class LinearModel:
     output_values : ndarray
         Outputs at the state itself.
     turning : ndarray (3,) [rad/s]
-        Angular velocity of the frame that the states are seen from, zero about an equilibrium.
+        Angular velocity of the frame of the states, zero about an equilibrium.
     t : float [s]
     point : Result
         The state itself, as a result with one time.
     seen_from : str
-        The frame from which the motion is steady, in words; empty about an equilibrium.
+        Description of the frame in which the motion is steady; empty about an equilibrium.
     large : bool
-        Whether there are so many velocities that what is dense is made when asked for.
+        Whether there are so many velocities that dense matrices are computed on demand.
     notes : tuple of str
-        What holds for one side only: closed contacts that are about to part.
+        Conditions valid on one side only: closed contacts that are about to open.
     period : float, optional [s]
-        With sampled controllers: the equations are x(t + period) = A x(t) + B u, y = C x + D u, t being an instant of
-        the first of them, x the state just before it, y outputs from it on, u inputs that are held until the next. The
-        eigenvalues are multipliers: what they do not exceed 1 in size dies out.
+        With sampled controllers: the equations are x(t + period) = A x(t) + B u, y = C x + D u, where t is an instant
+        of the first of them, x the state just before it, y outputs from it on, u inputs constant until the next. The
+        eigenvalues are multipliers: modes with magnitude below 1 decay.
     """
 
     def __init__(
@@ -270,14 +270,14 @@ class LinearModel:
 
     @property
     def dense(self) -> StateSpace:
-        """All that is dense."""
+        """The dense equations."""
         if not isinstance(self._dense, StateSpace):
             self._dense = self._dense()
         return self._dense
 
     @property
     def descriptor(self) -> Descriptor:
-        """The equations with the constraints left in, sparse."""
+        """The sparse equations with constraints."""
         if callable(self._sparse):
             self._sparse = self._sparse()
         return self._sparse
@@ -329,7 +329,7 @@ class LinearModel:
 
     @property
     def eigenvalues(self) -> np.ndarray:
-        """Of A, by imaginary, then real part, (n,) complex [1/s]; those that cannot be told apart are their mean."""
+        """Eigenvalues of A, by imaginary, then real part, (n,) complex [1/s]; indistinguishable ones are averaged."""
         own = self.dense
         if callable(own.eigenvalues):
             own.eigenvalues = own.eigenvalues()
@@ -354,10 +354,10 @@ class LinearModel:
         return control.ss(self.A, self.B, self.C, self.D, dt, name=_control_name(self.name), **names)
 
     def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
-        """Zeros, poles [1/s] and gain of a transfer function; the only input and output if not named.
+        """Return zeros, poles [1/s] and gain of a transfer function; the only input and output if not named.
 
         G(s) = gain prod(s - zeros) / prod(s - poles). The zeros are the finite eigenvalues of the pencil ([A b; c d],
-        [I 0; 0 0]) (Emami-Naeini and Van Dooren 1982), the gain is found from G far from all of them.
+        [I 0; 0 0]) (Emami-Naeini and Van Dooren 1982), the gain follows from G far from all of them.
         """
         from scipy.linalg import eigvals
 
@@ -485,11 +485,11 @@ class LinearModel:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())
 
     def input_index(self, name: str | None) -> int:
-        """Which input that is; the only one if not named."""
+        """Return the index of an input; the only one if not named."""
         return self.inputs.index(self._named("input", self.inputs, name))
 
     def output_index(self, name: str | None) -> int:
-        """Which output that is; the only one if not named."""
+        """Return the index of an output; the only one if not named."""
         return self.outputs.index(self._named("output", self.outputs, name))
 
     def _named(self, what: str, names: tuple[str, ...], name: str | None) -> str:
@@ -507,14 +507,14 @@ def _control_name(name: str) -> str:
 
 
 def _eigenvalue_text(w: complex) -> str:
-    """A number, or a complex pair; parts that are rounding beside the other are left out."""
+    """Return a number, or a complex pair, as text; negligible parts are left out."""
     least = ROUNDING_PART * abs(w)
     real, imag = (part if abs(part) > least else 0.0 for part in (w.real, w.imag))
     return f"{real:.6g} +- {imag:.6g} i" if imag else f"{real:.6g}"
 
 
 def sort_branches(roots: np.ndarray) -> np.ndarray:
-    """Sort each row's roots so that they go on from the row before, (rows, n)."""
+    """Sort each row's roots so that they continue those of the row before, (rows, n)."""
     from scipy.optimize import linear_sum_assignment
 
     out = roots.copy()

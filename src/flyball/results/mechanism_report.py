@@ -12,7 +12,7 @@ from ..model.messages import listing, suggest
 from .health import InitialDeviation, deviation_summary
 from .wording import tuple_text
 
-AXIS_TOLERANCE = 1e-9  # a principal axis that differs by less from an axis of the body is that axis
+AXIS_TOLERANCE = 1e-9  # a principal axis that differs by less from an axis of the body counts as that axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class MassProperties:
 
 @dataclass(frozen=True, eq=False)
 class MassReport:
-    """What `Mechanism.mass_properties` found: ``report["crank"].moments``, ``report.total.mass``; printed as a table.
+    """Result of `Mechanism.mass_properties`: ``report["crank"].moments``, ``report.total.mass``; printed as a table.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class MassReport:
     bodies : dict of MassProperties
         By name of the body.
     total : MassProperties
-        All bodies together, where they are at the start.
+        All bodies together, in the initial position.
     """
 
     name: str
@@ -127,7 +127,7 @@ class MassReport:
 
 
 def axis_letters(axes: np.ndarray) -> str:
-    """The body's axes that the principal ones are, such as "z, x, y"; nothing if they are others."""
+    """Return the body's axes that are principal axes, such as "z, x, y"; empty if they differ."""
     size = np.abs(axes).T
     if np.abs(size.max(axis=1) - 1.0).max() > AXIS_TOLERANCE or np.sort(size, axis=1)[:, :2].max() > AXIS_TOLERANCE:
         return ""
@@ -140,7 +140,7 @@ def axis_directions(axes: np.ndarray) -> str:
 
 
 def _vector_text(p: np.ndarray) -> str:
-    """Components in brackets; what is only rounding beside the others is 0."""
+    """Return components in brackets; negligible ones are 0."""
     return tuple_text(p, 5)
 
 
@@ -152,7 +152,7 @@ def _as_data(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-EQUAL_MOMENTS = 1e-9  # moments that differ by less than this part are the same
+EQUAL_MOMENTS = 1e-9  # moments that differ by less than this fraction count as equal
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class BodyReport:
 
 @dataclass(frozen=True)
 class Report:
-    """What `Mechanism.check` found out."""
+    """Result of `Mechanism.check`."""
 
     name: str
     planar: bool
@@ -189,18 +189,18 @@ class Report:
     joints: int
     forces: int
     drivers: int
-    gruebler: int  # freedoms by counting
-    freedoms: int  # freedoms by rank
-    redundant: tuple[str, ...]  # elements whose constraints depend on one another
-    redundancy: int  # how many rows say nothing new
+    gruebler: int  # degrees of freedom by counting
+    freedoms: int  # degrees of freedom by rank
+    redundant: tuple[str, ...]  # elements with dependent constraints
+    redundancy: int  # number of redundant rows
     undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
-    moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
-    departures: tuple[InitialDeviation, ...]  # what of the description the assembled start does not have
+    moved: dict[str, float]  # body -> displacement of its centre of mass by assembly [m]
+    departures: tuple[InitialDeviation, ...]  # numbers of the description that the assembled state does not satisfy
     mass: float  # of all bodies together [kg]
     com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
-    events: dict[str, str] = field(default_factory=dict)  # event -> when it is, and what it does
-    cut: str = ""  # whether `redundant` and `undetermined` are not complete, in words
+    events: dict[str, str] = field(default_factory=dict)  # event -> description of its condition and actions
+    cut: str = ""  # why `redundant` and `undetermined` are incomplete, if so
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""

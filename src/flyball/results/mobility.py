@@ -1,4 +1,4 @@
-"""Mobility of a mechanism: freedoms, free motions, redundant constraint sets and the remedies found for them."""
+"""Mobility of a mechanism: degrees of freedom, free motions, redundant constraint sets and remedies."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy as np
 from ..model.joint import Joint
 from ..model.model import Model
 
-MAX_BODIES = 12  # bodies that a line names
-MAX_ELEMENTS = 12  # elements that a line names
+MAX_BODIES = 12  # number of bodies in a line
+MAX_ELEMENTS = 12  # number of elements in a line
 LEVEL_PLURALS = {"position": "positions", "velocity": "velocities"}
 
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """One way in which a mechanism can move, with nothing else free moving.
+    """One free motion of a mechanism, with all other free coordinates at rest.
 
     Attributes
     ----------
     name : str
-        What stands for it: a coordinate such as ``"A.angle"``, or words such as ``"coupler turns about (1, 0, 0)"``.
+        Its name: a coordinate such as ``"A.angle"``, or a description such as ``"coupler turns about (1, 0, 0)"``.
     coordinate : str
         The coordinate, whose rate in ``velocity`` is 1; "" if the motion has none of a joint or a body.
     bodies : tuple of str
-        Those that move.
+        Moving bodies.
     velocity : ndarray (nv,)
         Of the mechanism in absolute coordinates [m/s], [rad/s].
     """
@@ -56,20 +56,20 @@ class FreeMotion:
 
 @dataclass(frozen=True)
 class FreedomGeometry:
-    """What freedoms rest on.
+    """Degrees of freedom by rank, by counting, and for general dimensions.
 
     Attributes
     ----------
     here : int
-        Freedoms by rank at this position.
+        Degrees of freedom by rank at this position.
     nearby : int
-        Freedoms by rank next to it, in positions that the mechanism can move to: those of its true motion.
+        Degrees of freedom by rank in reachable neighbouring positions: those of its true motion.
     generic : int
-        Freedoms that joints of the same kinds have with general dimensions.
+        Degrees of freedom for joints of the same kinds with general dimensions.
     gruebler : int
-        Freedoms by counting.
+        Degrees of freedom by counting.
     positions : list of ndarray
-        Positions next to this one in which it was looked at.
+        Neighbouring positions that were analysed.
     """
 
     here: int
@@ -80,12 +80,12 @@ class FreedomGeometry:
 
     @property
     def singular(self) -> bool:
-        """Whether the rank is smaller here than next to it."""
+        """Whether the rank is smaller here than in neighbouring positions."""
         return self.nearby < self.here
 
     @property
     def special(self) -> bool:
-        """Whether some of the true freedom rests on special dimensions."""
+        """Whether some of the true degrees of freedom depend on special dimensions."""
         return self.generic < self.nearby
 
     @property
@@ -94,7 +94,8 @@ class FreedomGeometry:
         said = []
         if self.singular and self.nearby == 0 and not self.positions:
             said.append(
-                f"{_freedom_count(self.here)} for the moment only: it can shake, but not move, from this singular position"
+                f"{_freedom_count(self.here)} for the moment only: it can shake, but not move, from this "
+                f"singular position"
             )
         elif self.singular:
             said.append(f"singular position: {_freedom_count(self.here)} here, {self.nearby} next to it")
@@ -130,7 +131,7 @@ def _freedom_count(n: int) -> str:
 
 @dataclass(frozen=True)
 class JointChange:
-    """One element that a cure changes: what it is replaced by, or None where it is left out."""
+    """Change of one element by a remedy: its replacement, or None if it is left out."""
 
     name: str
     kind: str
@@ -149,7 +150,7 @@ class JointChange:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Changes that take away what is too many and add no freedom; none where those for sets before do for this too."""
+    """Changes that remove redundant constraints without adding freedom; empty if those for earlier sets suffice."""
 
     changes: tuple[JointChange, ...]
 
@@ -159,7 +160,7 @@ class Remedy:
         return " and ".join(c.text for c in self.changes) or "the changes for the sets before do for this one too"
 
     def applied(self, model: Model) -> Any:
-        """A copy of the mechanism with the changes made."""
+        """Return a copy of the mechanism with the changes made."""
         return model.changed({c.name: c.by for c in self.changes})
 
     def as_dict(self) -> dict[str, Any]:
@@ -170,25 +171,25 @@ class Remedy:
 
 @dataclass(frozen=True)
 class RedundantSet:
-    """Elements whose constraints depend on one another; without any one of them the others would not.
+    """Elements with a minimal set of dependent constraints: without any one of them the others are independent.
 
     Attributes
     ----------
     elements : tuple of str
     count : int
-        Constraints too many.
+        Number of redundant constraints.
     contradiction : str
-        "" where they say the same twice; else what they disagree on, ``"position"`` or ``"velocity"``.
+        "" if they are consistent; else what they contradict each other in, ``"position"`` or ``"velocity"``.
     gap : float
-        By how much they disagree, seen at one of them (a driver, if there is one) if all others are fulfilled [unit].
+        Size of the contradiction, at one of them (a driver, if there is one) with all others satisfied [unit].
     here_only : bool
-        Whether they depend on one another in this singular position only, and not next to it.
+        Whether they are dependent in this singular position only, and not in neighbouring ones.
     undetermined : dict
         Joint -> reaction components (world axes, on ``body_j``) that this leaves undetermined.
-    cure : Cure or None
-        What to replace or leave out; those of the sets before are taken as done.
+    cure : Remedy or None
+        What to replace or leave out; remedies of earlier sets are assumed to be applied.
     cut : str
-        Where none was found: how far the search went, if there is more that could be tried.
+        If no remedy was found: extent of the search, if it was cut off.
     unit : str
         Of the gap: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
     """
@@ -249,27 +250,27 @@ def _axis_text(axis: Any) -> str:
     return "(" + ", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in axis) + ")"
 
 
-MAX_LINES = 12  # of a kind that are printed
+MAX_LINES = 12  # number printed of each kind
 
 
 class MobilityDetails(Protocol):
-    """Where a mechanism was looked at, and what finds out more about it when it is asked for."""
+    """The analysed position of a mechanism, and further analyses on demand."""
 
     @property
     def gap(self) -> str:
-        """Why it cannot be assembled, if it cannot."""
+        """Why it cannot be assembled, if so."""
 
     @property
     def assembly(self) -> Any:
-        """The position that was looked at."""
+        """The analysed position."""
 
     @property
     def velocities(self) -> np.ndarray:
-        """A basis (nv, f) of the velocities that the rows allow; of a large mechanism some of it."""
+        """A basis (nv, f) of the velocities that the rows allow; for a large mechanism a part of it."""
 
     @property
     def name(self) -> str:
-        """Of the mechanism."""
+        """Name of the mechanism."""
 
     def sets(self, m: Mobility) -> tuple[RedundantSet, ...]:
         """See `Mobility.sets`."""
@@ -283,19 +284,18 @@ class MobilityDetails(Protocol):
 
 @dataclass(frozen=True)
 class Mobility:
-    """Freedoms and redundancy of a mechanism at a position.
+    """Degrees of freedom and redundancy of a mechanism at a position.
 
     Attributes
     ----------
     velocities, rows, rank : int
         Velocities of all bodies, constraint rows, and how many of these are independent.
     redundant : tuple of str
-        Elements whose rows take part in a dependency.
+        Elements with dependent rows.
     undetermined : dict
         Joint -> reaction components (world axes, on ``body_j``) that redundancy leaves undetermined.
     followed : int or None
-        How many of the constraints too many these two come from, where a mechanism is so large that they are not
-        found for all; None: for all.
+        Number of redundant constraints evaluated for these two, if a mechanism is too large to evaluate all; None: all.
     """
 
     velocities: int
@@ -303,28 +303,28 @@ class Mobility:
     rank: int
     redundant: tuple[str, ...] = ()
     undetermined: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    without: str = ""  # what is there besides, and not counted
+    without: str = ""  # parts of the mechanism that are not counted
     found: MobilityDetails | None = field(default=None, compare=False, repr=False)
     followed: int | None = None
 
     @property
     def gruebler(self) -> int:
-        """Freedoms by counting rows (Gruebler and Kutzbach)."""
+        """Degrees of freedom by counting rows (Gruebler and Kutzbach)."""
         return self.velocities - self.rows
 
     @property
     def freedoms(self) -> int:
-        """Freedoms by rank, at this position."""
+        """Degrees of freedom by rank, at this position."""
         return self.velocities - self.rank
 
     @property
     def redundancy(self) -> int:
-        """Rows that say nothing new."""
+        """Number of redundant rows."""
         return self.rows - self.rank
 
     @property
     def cut(self) -> str:
-        """In words, whether `redundant` and `undetermined` are not complete."""
+        """Why `redundant` and `undetermined` are incomplete, if so."""
         if self.followed is None or self.followed >= self.redundancy:
             return ""
         return (
@@ -333,22 +333,22 @@ class Mobility:
 
     @cached_property
     def sets(self) -> tuple[RedundantSet, ...]:
-        """The independent sets of constraints that depend on one another, each as small as can be, with cures."""
+        """The independent minimal sets of dependent constraints, with remedies."""
         return self.there.sets(self)
 
     @cached_property
     def motions(self) -> tuple[FreeMotion, ...]:
-        """The free motions by name; of a large mechanism the first of them."""
+        """The free motions by name; for a large mechanism the first of them."""
         return self.there.motions(self)
 
     @cached_property
     def geometry(self) -> FreedomGeometry:
-        """What the freedoms rest on: counting, special dimensions, or a singular position."""
+        """Degrees of freedom by counting, for general dimensions, and next to this position."""
         return self.there.geometry(self)
 
     @property
     def there(self) -> MobilityDetails:
-        """Where it was looked at."""
+        """The analysed position."""
         if self.found is None:
             raise ValueError("this count was made without its mechanism")
         return self.found

@@ -1,7 +1,7 @@
-"""Modes of a linear model, their shapes as motions, root loci over a parameter, and which motions grow.
+"""Modes of a linear model, their shapes as motions, root loci over a parameter, and stability.
 
-Equilibria, modes and root loci judge growth in the same way: eigenvalues come without their rounding errors
-(`derivatives/eigenvalues.py`), so a real part that is not zero is one.
+Equilibria, modes and root loci use the same stability criterion: rounding errors are removed from eigenvalues
+(`derivatives/eigenvalues.py`), so a nonzero real part is significant.
 """
 
 from __future__ import annotations
@@ -17,33 +17,31 @@ from ..model.output_files import PAGE, write_file
 from .health import Health
 from .result import Result
 
-AXIS_TOLERANCE = (
-    1e-8  # part of an eigenvalue within which a locus has it on the axis: nearer, crossings are not told apart
-)
+AXIS_TOLERANCE = 1e-8  # relative to an eigenvalue: real parts below this count as on the axis in a locus
 
 
 def is_growing(values: np.ndarray) -> np.ndarray:
-    """Which eigenvalues belong to motions that grow, bool as ``values``."""
+    """Return whether each eigenvalue belongs to a growing motion, bool as ``values``."""
     return np.asarray(values).real > 0.0
 
 
 def half_plane(values: np.ndarray) -> np.ndarray:
-    """Which half plane each eigenvalue of a locus lies in: 1, -1, or 0 on the axis or just beside it, as ``values``."""
+    """Return the half plane of each eigenvalue of a locus: 1, -1, or 0 on or very near the axis, as ``values``."""
     w = np.asarray(values)
     return np.where(np.abs(w.real) > AXIS_TOLERANCE * np.abs(w), np.sign(w.real), 0.0).astype(int)
 
 
 def largest_growth(values: np.ndarray, blur: np.ndarray, *, discrete: bool) -> float:
-    """The largest growth: above zero if a motion grows, below if all decay, zero if that is open.
+    """Return the largest growth: positive if a motion grows, negative if all decay, zero if undecided.
 
     Parameters
     ----------
     values : ndarray (n,) complex
         Eigenvalues.
     blur : ndarray (n,)
-        What each is uncertain by.
+        Uncertainty of each.
     discrete : bool
-        Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
+        Whether they are multipliers from one instant to the next, with the stability limit 1.
     """
     grows = values.real
     if discrete:
@@ -63,28 +61,28 @@ class Modes:
     ----------
     eigenvalues : ndarray (n,) complex [1/s]
     shapes : ndarray (nv, n) complex
-        Changes of all positions along the mechanism's velocities; the largest part, turns counted at the mechanism's
-        length, is 1.
+        Changes of all positions along the mechanism's velocities; the largest part is 1, with angles multiplied by the
+        mechanism's length.
     names, units : tuple of str
-        Of what each row of the shapes is a change of.
+        Coordinate of each row of the shapes.
     turning : ndarray (3,) [rad/s]
-        Angular velocity of the frame that they are seen from.
+        Angular velocity of the frame in which they are given.
     point : Result
-        Where they are about.
+        Operating point.
     growing : bool
-        Whether a mode that was not asked for grows.
+        Whether a mode that is not listed grows.
     fastest : float [1/s]
-        Size of the largest eigenvalue, those that were not asked for included.
+        Magnitude of the largest eigenvalue, including modes that are not listed.
     multiplicity, geometric_multiplicity : ndarray (n,) int
-        How often each eigenvalue is repeated, and how many shapes it has; where these are fewer, the eigenvalue is
-        defective: motions also grow as t exp(eigenvalue t), such as a body that nothing holds and that drifts away.
+        How often each eigenvalue is repeated, and how many shapes it has; if these are fewer, the eigenvalue is
+        defective: motions also grow as t exp(eigenvalue t), such as the drift of a free body.
     residual : float
-        The largest part that A x - eigenvalue x leaves of |A| |x| + |eigenvalue| |x|, over all shapes; refused above
-        1e-9.
+        Largest residual A x - eigenvalue x relative to |A| |x| + |eigenvalue| |x| over all shapes; above 1e-9 an error
+        is raised.
     seen_from : str
-        The frame from which the motion is steady, in words; empty at rest.
+        Description of the frame in which the motion is steady; empty at rest.
     notes : tuple of str
-        What holds for one side only: closed contacts that are about to part.
+        Conditions valid on one side only: closed contacts that are about to open.
     """
 
     eigenvalues: np.ndarray
@@ -107,12 +105,12 @@ class Modes:
 
     @property
     def omega(self) -> np.ndarray:
-        """Undamped angular frequencies |eigenvalue| [rad/s], 0 for rigid ones; what grows or decays counts too."""
+        """Undamped angular frequencies |eigenvalue| [rad/s], also of real eigenvalues; 0 for rigid modes."""
         return np.abs(self.eigenvalues)
 
     @property
     def frequency(self) -> np.ndarray:
-        """Frequencies of oscillation |Im eigenvalue| / 2 pi [Hz]; 0 for those that do not oscillate."""
+        """Frequencies of oscillation |Im eigenvalue| / 2 pi [Hz]; 0 for modes that do not oscillate."""
         return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
 
     @property
@@ -133,7 +131,7 @@ class Modes:
 
     @property
     def stable(self) -> bool:
-        """Whether no mode grows, those that were not asked for included; of large mechanisms those listed."""
+        """Whether no mode grows, including modes not listed; for large mechanisms those listed only."""
         return not self.growing and "unstable" not in self.kinds
 
     def __len__(self) -> int:
@@ -160,7 +158,7 @@ class Modes:
         return out + [("note", text) for text in self.notes]
 
     def repeated(self) -> list[str]:
-        """What is to be known of eigenvalues that are repeated, a text for each."""
+        """Return a text on each repeated eigenvalue."""
         out, told = [], set()
         for k, (m, g) in enumerate(zip(self.multiplicity.tolist(), self.geometric_multiplicity.tolist(), strict=True)):
             if m > 1 and (value := complex(self.eigenvalues[k])) not in told:
@@ -192,14 +190,14 @@ class Modes:
     def motion(self, k: int, amplitude: float = 0.1, outputs: int = 81) -> Result:
         """Mode k as a motion over one period, largest part ``amplitude`` (radians, or parts of the length).
 
-        Damping is left out, so that the motion repeats. A mode that does not oscillate goes out and back.
+        Damping is left out, so that the motion is periodic. A mode that does not oscillate is shown going out and back.
         """
         pass
 
         return mode_motion(self, k, amplitude, outputs)
 
     def to_html(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write a page in which the modes move; options as for `flyball.view.mode_animation.modes_page`."""
+        """Write a page with animated modes; options as for `flyball.view.mode_animation.modes_page`."""
         from ..view.mode_animation import modes_page
 
         write_file(path, modes_page(self, **options), PAGE)
@@ -239,18 +237,18 @@ def mode_motion(m: Modes, k: int, amplitude: float, outputs: int) -> Result:
 
 
 class Crossing(NamedTuple):
-    """Where stability changes: eigenvalues pass from one half plane into the other.
+    """A change of stability: eigenvalues cross the imaginary axis.
 
     Attributes
     ----------
     value : float
-        The parameter's.
+        Value of the parameter.
     eigenvalue : complex [1/s]
-        On the imaginary axis; of a pair the upper one.
+        Eigenvalue on the imaginary axis; of a pair the upper one.
     kind : str
         ``"flutter"`` where oscillations begin to grow or cease to, ``"divergence"`` at zero.
     change : int
-        How many eigenvalues more have a positive real part beyond it.
+        Change in the number of eigenvalues with positive real part beyond it.
     """
 
     value: float
@@ -268,13 +266,13 @@ class RootLocus:
     parameter : str
     values : ndarray (m,)
     eigenvalues : ndarray (m, n) complex [1/s]
-        Each column is a branch, followed by eigenvalues and shapes; parts that are rounding are 0.
+        Each column is a branch, tracked by eigenvalues and shapes; rounding errors are set to 0.
     crossings : list of Crossing
         Every change of stability between the values, found to rounding, not interpolated.
     path_values, path : ndarray (p,), (p, n) complex
-        The same branches with the values that were added where something happens, as they are drawn.
+        The same branches with values added at crossings and meeting points, as drawn.
     seen_from : tuple of str
-        Frames from which motions along it are steady, in words; empty at rest.
+        Descriptions of the frames in which motions along it are steady; empty at rest.
     """
 
     name: str

@@ -1,9 +1,8 @@
 """Phases of a motion between events: their modes and parameters, energy of events, states at an instant.
 
-Within a phase the modes of all switches and all parameters are constant. Quantities that are computed later ask
-the phases what held at their time: which way friction slid, which stop was closed, what a parameter was. `Moment`
-is the motion just before or after an event. Energies lost and given by events are counted from the start of the
-motion.
+Within a phase the modes of all switches and all parameters are constant. Quantities that are computed later use the
+phases for the state at their time: sliding directions, closed stops, parameter values. `Moment` is the motion just
+before or after an event. Energies lost and given by events are counted from the start of the motion.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class RecordedModes(NamedTuple):
-    """What is recorded of every switch, (ns,) each: see `tables.system.Modes`."""
+    """Recorded data of every switch, (ns,) each: see `tables.table_definitions.Modes`."""
 
     mode: np.ndarray
     hold: np.ndarray
@@ -35,22 +34,22 @@ class RecordedModes(NamedTuple):
 
 @dataclass(frozen=True)
 class Phase:
-    """Output times in a row between which nothing switched.
+    """Consecutive output times between which nothing switched.
 
     Attributes
     ----------
     rows : int
-        How many output times; none is possible.
+        Number of output times, possibly 0.
     switch : ndarray (5, ns)
-        Mode, what is held, lower and upper bounds of every switch, whether it was released (`RecordedModes`).
+        Mode, held value, lower and upper bounds of every switch, whether it was released (`RecordedModes`).
     sigma : ndarray (ns,) or (ns, rows)
-        The direction in which each acts.
+        Direction of each switch.
     values : Values
         The tables, with parameters as they were then.
     lost : float [J]
-        Lost in impacts and sudden locking since the start.
+        Energy lost in impacts and sudden locking since the start.
     given : float [J]
-        Given by kicks since the start.
+        Energy given by applied impulses since the start.
     end : ndarray (ny,)
         The state at its end, before the event.
     """
@@ -76,12 +75,12 @@ class Phase:
 
 @dataclass(frozen=True)
 class Phases:
-    """All of a motion, in order."""
+    """All phases of a motion, in order."""
 
     all: tuple[Phase, ...]
 
     def over(self, what: str) -> np.ndarray:
-        """A field of the stretches at every output time, times last."""
+        """Return a field of the phases at every output time, times last."""
         every = [np.asarray(getattr(x, what), float) for x in self.all]
         return np.concatenate([np.repeat(x[..., None], s.rows, -1) for x, s in zip(every, self.all, strict=True)], -1)
 
@@ -97,7 +96,7 @@ class Phases:
         return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
 
     def pieces(self) -> list[tuple[slice, Phases]]:
-        """Stretches with the same parameters, and the output times that they take up."""
+        """Return phases of equal parameters, and their output times."""
         out, first = [], 0
         for _, group in groupby(self.all, key=lambda x: id(x.values)):
             found = Phases(tuple(group))
@@ -107,13 +106,13 @@ class Phases:
         return out
 
     def moment(self, k: int) -> Phases | None:
-        """Stretch k as that of one time; None where ways change within it and none is known."""
+        """Return phase k reduced to one time; None if directions change within it and none is recorded."""
         x = self.all[k]
         ways = x.ways[:, -1] if x.ways.shape[1] else None
         return None if ways is None else Phases((replace(x, rows=1, sigma=ways),))
 
     def cut(self, rows: int) -> Phases:
-        """Those of the first so many output times."""
+        """Return the phases of the first ``rows`` output times."""
         out, left = list[Phase](), rows
         for x in self.all:
             n = min(x.rows, left)
@@ -123,12 +122,12 @@ class Phases:
 
 
 def phases_or_none(phases: Sequence[Phase]) -> Phases | None:
-    """The stretches of a motion; None where there is none."""
+    """Return the phases of a motion; None if there are none."""
     return Phases(tuple(phases)) if phases else None
 
 
 def split_by_parameters(result: Any) -> tuple[Any, ...]:
-    """A result piece by piece, if parameters changed in it, each with its own; else none."""
+    """Return a result in pieces of constant parameters, if parameters changed; else none."""
     cuts = result.phases.pieces() if result.phases is not None else []
     if len(cuts) < 2:
         return ()
@@ -147,22 +146,23 @@ def split_by_parameters(result: Any) -> tuple[Any, ...]:
 
 
 EVENT_WORK = "event_work"
-"""Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
+"""Energy given by events: by applied impulses, and by parameter changes."""
 CUMULATIVE_ENERGIES = ("friction_loss", "impact_loss", "surface_work", "numerical_loss", EVENT_WORK)
-"""Energies in `Result.exchanged` that count on from one motion to the next."""
+"""Energies in `Result.exchanged` that are accumulated over consecutive motions."""
 ALL_PARTS = ""
 
 
 @dataclass
 class MotionStart:
-    """How a motion began.
+    """Initial state of a motion.
 
     Attributes
     ----------
     y : ndarray (ny,) or None
-        The state vector then; None where nobody said.
+        The initial state vector; None if unknown.
     done : dict
-        What motions before it had exchanged [J], by the names of `CUMULATIVE_ENERGIES`, and the work of what each force stores.
+        Energies exchanged by earlier motions [J], by the names of `CUMULATIVE_ENERGIES`, and the earlier work of each
+        force's stored energy.
     """
 
     y: np.ndarray | None = None
@@ -170,7 +170,7 @@ class MotionStart:
 
 
 def event_energies(result: Any) -> dict[str, np.ndarray]:
-    """Energies [J] since the start, by their names in `Result.exchanged`: lost in impacts, given by events."""
+    """Return energies [J] since the start, by their names in `Result.exchanged`: lost in impacts, given by events."""
     if result.phases is None:
         return {}
     done, over = result.begun.done, result.phases.over
@@ -179,12 +179,12 @@ def event_energies(result: Any) -> dict[str, np.ndarray]:
 
 
 def stored_reference(result: Any, name: str) -> np.ndarray:
-    """What a force had stored at the start, and what events stored in it since [J] (n,).
+    """Return the energy stored in a force at the start, plus that stored in it by events since [J] (n,).
 
-    Less what it stores now, that is what it gave the bodies since the start.
+    The work on the bodies since the start is this value minus the currently stored energy.
     """
     whole, at = result.within or (result, slice(None))
-    if isinstance(at, int):  # a moment of that stretch
+    if isinstance(at, int):  # a moment of that phase
         return np.full(len(result.t), _stored_by_events(whole, name)[at] + _stored_at_start(whole, name))
     known = whole.__dict__.setdefault("_basis", {})
     if name not in known:
@@ -194,14 +194,14 @@ def stored_reference(result: Any, name: str) -> np.ndarray:
 
 
 def event_energies_in_phase(result: Any, k: int) -> dict[str, np.ndarray]:
-    """As `event_energies`, at a moment of stretch k of a result."""
+    """Return the same as `event_energies`, at a moment of phase k of a result."""
     done, x = result.begun.done, result.phases.all[k]
     given = x.given + done.get(EVENT_WORK, 0.0) + _stored_by_events(result, ALL_PARTS)[k]
     return {"impact_loss": np.array([x.lost + done.get("impact_loss", 0.0)]), EVENT_WORK: np.array([given])}
 
 
 def energies_at_end(before: Any) -> dict[str, float]:
-    """What a motion that goes on from an earlier one begins with, as `Begun.done` has it."""
+    """Return the energies with which a continued motion starts, for `MotionStart.done`."""
     done, last = before.begun.done, before.phases.all[-1] if before.phases is not None else None
     out = {k: done[k] for k in CUMULATIVE_ENERGIES if k in done}
     if last is not None:
@@ -219,16 +219,16 @@ def energies_at_end(before: Any) -> dict[str, float]:
 
 
 def cumulative_exchanges(result: Any) -> dict[str, np.ndarray]:
-    """Energies that contacts exchanged, with those of the motions before."""
+    """Return the energies exchanged by contacts, including earlier motions."""
     return {
         k: x + (result.begun.done.get(k, 0.0) if k in CUMULATIVE_ENERGIES else 0.0) for k, x in result.exchanged.items()
     }
 
 
 def _stored_at_start(result: Any, name: str) -> Any:
-    """Stored in a force at the start, and the work of that before it [J]; at the first output if nobody said."""
+    """Return the energy stored in a force at the start, and its earlier work [J]; at the first output if unknown."""
     if result.begun.y is None or _starts_at_first_output(result):
-        stored = result[name].energy[:1].sum()  # complex where derivatives are asked for
+        stored = result[name].energy[:1].sum()  # complex for derivatives
         return stored + result.begun.done.get(name, 0.0)
     known = result.__dict__.setdefault("_at_first", {})
     if not known:
@@ -239,7 +239,7 @@ def _stored_at_start(result: Any, name: str) -> Any:
 
 
 def _starts_at_first_output(result: Any) -> bool:
-    """Whether the first output is the state that the motion began with, and no event changed anything since."""
+    """Return whether the first output is the initial state, with no change by events since."""
     if result.phases is not None or not len(result.t):
         return False
     first = np.concatenate([x[0] for x in (result.q, result.v, result.hints)])
@@ -247,14 +247,14 @@ def _starts_at_first_output(result: Any) -> bool:
 
 
 def _at_output_times(result: Any, each: list[float]) -> np.ndarray:
-    """Numbers of the stretches at every output time."""
+    """Return numbers of the phases at every output time."""
     return np.repeat(each, [x.rows for x in result.phases.all])
 
 
 def _stored_by_events(result: Any, name: str) -> list[float]:
-    """What events stored since the start [J], by stretches, in a force or by changes of parameters in all (`ALL_PARTS`).
+    """Return the energy stored by events since the start [J], by phases, in a force or in all parts (`ALL_PARTS`).
 
-    That is what the same state has more afterwards. Of a force that is released all is gone.
+    It is the increase of the energy of the same state. A released force loses all its energy.
     """
     known = result.__dict__.setdefault("_jumped", {})
     if not known:
@@ -285,7 +285,7 @@ def _find_stored_by_events(result: Any) -> dict[str, list[float]]:
 
 
 def _stored_energies(result: Any, by: tuple[Any, Any], y: np.ndarray) -> dict[str, float]:
-    """Energy [J] of a state by tables and switches (none: all is in force): of every force, and all of it."""
+    """The energy [J] of a state with given tables and switches (none: all active): of every force, and in total."""
     values, switch = by
     s = values.structure
     q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
@@ -306,11 +306,11 @@ class Moment:
     ----------
     t : float [s]
     y : ndarray
-        State vector: coordinates, velocities, turns and works.
+        State vector: coordinates, velocities, angles and works.
     values : Values
         The mechanism with the parameters of that time.
     came : tuple of (ndarray, int)
-        The state that the motion came to the instant with, and whether this is before (0) or after (1) it.
+        The state with which the motion reached the instant, and whether this moment is before (0) or after (1) it.
     """
 
     def __init__(
@@ -320,7 +320,7 @@ class Moment:
 
     @cached_property
     def stretch(self) -> int:
-        """Which stretch of the motion it ends or begins; -1 where that is not known, as at the start."""
+        """Return the phase that it ends or begins; -1 if unknown, as at the start."""
         every = self._of.phases.all if self._of.phases is not None else ()
         if self.came is None:
             return -1
@@ -330,7 +330,7 @@ class Moment:
 
     @cached_property
     def alone(self) -> Result:
-        """A result of this one time; what nobody knows there is nan."""
+        """Return a result of this one time; unknown data are nan."""
         r = self._of
         s = self.values.structure
         q, v, z = (p[None, :] for p in np.split(self.y, [s.nq, s.nq + s.nv]))

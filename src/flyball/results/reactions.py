@@ -1,9 +1,9 @@
 """Reactions of joints over time, and impulses of an event by element.
 
-A body needs the wrench (m (a - g), I alpha + w x I w) about its centre of mass. What forces and rows do not give,
-its tree joint must; what its children need beyond that passes through it too. Summed from the leaves to the roots
-with the true accelerations, that is the wrench through every tree joint (recursive Newton-Euler: Luh, Walker and
-Paul 1980; Featherstone 2008, table 5.1). Through FREE and PLANAR nothing passes: the residual of the equations of
+A body needs the wrench (m (a - g), I alpha + w x I w) about its centre of mass. The part that forces and rows do not
+supply must come from its tree joint; the demand of its children passes through it too. Summed from the leaves to the
+roots with the true accelerations, that is the wrench through every tree joint (recursive Newton-Euler: Luh, Walker and
+Paul 1980; Featherstone 2008, table 5.1). FREE and PLANAR joints transmit nothing: the residual of the equations of
 motion.
 
 Impulses of an event come from the same sweep, with jumps of velocities in place of accelerations. Gravity and
@@ -46,7 +46,7 @@ class JointReactions:
     def of(self, joint: str) -> Wrench:
         """Force [N] on a joint's ``body_j`` at M's origin and torque [N m] about it.
 
-        What a driver does along a coordinate of the joint is the driver's, not the joint's.
+        The effort of a driver along a coordinate of the joint is not included.
         """
         if joint not in self._known:
             force, torque = self._of_rows(joint)
@@ -57,7 +57,7 @@ class JointReactions:
         return self._known[joint]
 
     def _of_rows(self, joint: str) -> Wrench:
-        """What the joint's own rows do."""
+        """Return the wrench of the joint's own rows."""
         result, s = self._result, self._result.values.structure
         force, torque = zero_wrench(result.records)
         for k in s.terms_of.get(joint, ()):
@@ -70,7 +70,7 @@ class JointReactions:
         return force, torque
 
     def _of_tree(self, name: str) -> Wrench:
-        """What passes through a tree joint, less what drivers that prescribe its coordinates do."""
+        """Return the wrench through a tree joint, without the efforts of drivers that prescribe its coordinates."""
         result, s = self._result, self._result.values.structure
         joint, tree = s.model[name], s.tree_joints[name]
         force, torque = load3(self.through, tree.child, 0), load3(self.through, tree.child, 3)
@@ -88,7 +88,7 @@ class JointReactions:
 
     @cached_property
     def through(self) -> np.ndarray:
-        """The wrench that every body's tree joint puts on it, (nb, 6, n).
+        """Return the wrench of every body's tree joint on the body, (nb, 6, n).
 
         Force [N], and torque [N m] about the body's centre of mass, world axes.
         """
@@ -101,7 +101,7 @@ class JointReactions:
         return -W.FB
 
     def _acting(self) -> SimpleNamespace:
-        """Kinematics, and what acts on every body with the tree joints left out: gravity, inertia, forces, rows."""
+        """Kinematics, and the wrenches on every body except those of tree joints: gravity, inertia, forces, rows."""
         result, s = self._result, self._result.values.structure
         W = self._inertial()
         for f in s.forces:
@@ -116,7 +116,7 @@ class JointReactions:
         return W
 
     def _inertial(self) -> SimpleNamespace:
-        """Kinematics, and gravity less what each body needs to move as it does."""
+        """Return kinematics, and gravity minus the inertia forces of each body."""
         S, records = self._result.values.system, self._result.records
         W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
         gravity = tuple(S.gravity)
@@ -127,7 +127,7 @@ class JointReactions:
         return W
 
     def _between(self, W: SimpleNamespace, name: str) -> None:
-        """A force between frames: the wrench on M's body, its reverse at the same point on F's."""
+        """Add the wrench of a force between frames: on M's body, with the reverse at the same point on F's."""
         (i, j), at, force, torque = self._result[name].acts()
         if j >= 0:
             apply_wrench(W, j, 1.0, force, torque, at)
@@ -135,7 +135,7 @@ class JointReactions:
             apply_wrench(W, i, -1.0, force, torque, at)
 
     def _term(self, W: SimpleNamespace, k: int, effort: np.ndarray) -> None:
-        """A term of a row or of a measured quantity that pushes with an effort."""
+        """Add the wrench of a term of a row or of a measured quantity with an effort."""
         t = self._result.values.structure.terms[k]
         F, M, (_, force, torque_M, torque_F, _) = term_over_time(self._result, k)
         i, j = (int(self._result.values.system.frame_body[frame]) for frame in (t.F, t.M))
@@ -145,7 +145,7 @@ class JointReactions:
             apply_wrench(W, i, effort, neg(force), torque_F, F[0])
 
     def _efforts(self) -> list[np.ndarray]:
-        """What acts along every measured quantity: forces, and drivers whose laws follow it.
+        """Return the effort along every measured quantity: of forces, and of drivers whose laws depend on it.
 
         The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier.
         """
@@ -161,7 +161,7 @@ class JointReactions:
         return out
 
     def _slope(self, law: int, slot: int) -> np.ndarray:
-        """Derivative of a driver's law by a sensor."""
+        """Return the derivative of a driver's law with respect to a sensor."""
         result, S = self._result, self._result.values.system
         sensed = result.measured.slots
         stack = np.zeros((result.values.structure.depth + 1 + STACK_RESERVE, 3), result.records.dtype)
@@ -174,17 +174,17 @@ class JointReactions:
 
 AppliedImpulse = tuple[Any, ...]
 IMPULSE_COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
-"""Components of an impulse and of its moment along the world's axes."""
+"""Components of an impulse and of its moment in world axes."""
 PLANAR_COMPONENTS = {"fx": "fx", "fy": "fy", "tz": "torque"}
-"""Those of them that there are in the plane, and what they are called there."""
+"""Their names in the plane."""
 
 
 class EventImpulses(Mapping):
     """Element -> its impulse.
 
-    What acts along one coordinate (limits, ropes, friction, clutches, drivers, an event's ``Impulse`` along a
-    coordinate) has a number [N s] or [N m s], and so has a coordinate that an event locks, by its name: it is part of
-    what its joint carries. A coupling has such a number for each of its coordinates, by their names. A joint has six:
+    An element that acts along one coordinate (limits, ropes, friction, clutches, drivers, an event's ``Impulse`` along
+    a coordinate) has a number [N s] or [N m s], and so has a coordinate that an event locks, by its name: it is part of
+    the impulse of its joint. A coupling has such a number for each of its coordinates, by their names. A joint has six:
     force and torque about the joint's point on ``body_j``, on that body, world axes. A contact has ``normal``,
     ``friction`` (its magnitude), and ``fx``, ``fy``, ``fz``, the impulse on its second side, world axes. An event's
     ``Impulse`` on a body, by the name of the event, has ``fx`` to ``tz``, the moment about the body's centre of mass;
@@ -193,12 +193,12 @@ class EventImpulses(Mapping):
     Parameters
     ----------
     own : mapping
-        Those of elements that act along a coordinate.
+        Impulses of elements that act along a coordinate.
     rows : ndarray
         Impulses of all rows, then of drivers that prescribe coordinates.
     blows : sequence
-        Impulses that were given: ``("body", row, force, torque about its centre of mass, event)``, or ``("along",
-        measured quantity, impulse, event)``.
+        Applied impulses: ``("body", row, force, torque about its centre of mass, event)``, or ``("along", measured
+        quantity, impulse, event)``.
     """
 
     def __init__(
@@ -208,21 +208,21 @@ class EventImpulses(Mapping):
         self._moments: tuple[Moment, Moment] | None = None
 
     def bound(self, before: Moment, after: Moment) -> EventImpulses:
-        """With all elements, for which the states before and after are needed."""
+        """Return the impulses of all elements, computed with the states before and after."""
         made = EventImpulses(self._own, self._rows, self._blows)
         made._moments = before, after
         return made
 
     def loose(self) -> EventImpulses:
-        """As it was found, without the states of its result."""
+        """Return the impulses without the states of a result."""
         return EventImpulses(self._own, self._rows, self._blows)
 
     def plain(self) -> dict[str, Any]:
-        """What it is made of, as plain data: arguments of the class."""
+        """Return plain data: the arguments of the class."""
         return {"own": self._own, "rows": self._rows.tolist(), "blows": self._blows}
 
     def on(self, body: str) -> dict[str, np.ndarray]:
-        """What each element did to a body: their sum is the change of its momentum.
+        """Return the impulse of each element on a body: their sum is the change of its momentum.
 
         Parameters
         ----------
@@ -232,7 +232,7 @@ class EventImpulses(Mapping):
         -------
         dict
             Element -> impulse [N s] and its moment about the body's centre of mass [N m s], world axes, (6,). Elements
-            that did nothing to it are left out.
+            without effect on it are left out.
 
         Raises
         ------
@@ -249,13 +249,13 @@ class EventImpulses(Mapping):
 
     @cached_property
     def _reactions(self) -> ImpulseReactions:
-        """What everything carried, found when first asked for."""
+        """Return the impulses of all elements, computed on demand."""
         assert self._moments is not None
         return ImpulseReactions(*self._moments, self._rows, self._blows)
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
-        """All elements: those that are always told, and of limits, contacts and their like those that took part."""
+        """Return all elements: joints and the like always, and limits, contacts and similar ones if they took part."""
         if self._moments is None:
             return tuple(self._own)
         s = self._moments[1].values.structure
@@ -291,12 +291,12 @@ class EventImpulses(Mapping):
         return repr(dict(self))
 
     def __getstate__(self) -> dict[str, Any]:
-        """With the states before and after, which `on` needs; what was made of them is made again."""
+        """Return the state with the states before and after, which `on` needs; derived data are computed again."""
         return {k: getattr(self, k) for k in ("_own", "_rows", "_blows", "_moments")}
 
 
 def sum_impulses(every: Sequence[EventImpulses]) -> EventImpulses:
-    """The impulses of jumps that follow one another at an instant, as those of one."""
+    """Return the sum of impulses of consecutive jumps at one instant."""
     own: Counter[str] = Counter()
     for x in every:
         own.update(x._own)
@@ -304,12 +304,12 @@ def sum_impulses(every: Sequence[EventImpulses]) -> EventImpulses:
 
 
 def impulse_data(impulse: Any) -> Any:
-    """An impulse of an element as plain data."""
+    """Return the impulse of an element as plain data."""
     return dict(impulse) if isinstance(impulse, Mapping) else np.asarray(impulse).tolist()
 
 
 def applied_by_event(applied: Sequence[AppliedImpulse]) -> dict[str, AppliedImpulse]:
-    """Blows by the names of their events, numbered where an event has several."""
+    """Return applied impulses by the names of their events, numbered if an event has several."""
     count = Counter(b[-1] for b in applied)
     seen: Counter[str] = Counter()
     out = {}
@@ -320,7 +320,7 @@ def applied_by_event(applied: Sequence[AppliedImpulse]) -> dict[str, AppliedImpu
 
 
 def applied_impulse_value(applied: AppliedImpulse, s: Structure) -> Any:
-    """A blow as it is told: a number along a coordinate, components of one on a body."""
+    """Return an applied impulse in its reported form: a number along a coordinate, components on a body."""
     if applied[0] == "along":
         return float(applied[2])
     parts = dict(zip(IMPULSE_COMPONENTS, map(float, (*applied[2], *applied[3])), strict=True))
@@ -328,7 +328,7 @@ def applied_impulse_value(applied: AppliedImpulse, s: Structure) -> Any:
 
 
 class ImpulseReactions(JointReactions):
-    """Reactions of an instant: impulses in place of forces."""
+    """Reactions at an instant: impulses in place of forces."""
 
     def __init__(self, before: Moment, after: Moment, rows: np.ndarray, applied: Sequence[AppliedImpulse]) -> None:
         came, went = before.alone, after.alone
@@ -340,7 +340,7 @@ class ImpulseReactions(JointReactions):
         self._after, self._blows = went, applied
 
     def told(self, name: str) -> Any:
-        """The impulse of a contact, joint, coupling or driver; see `EventImpulses`."""
+        """Return the impulse of a contact, joint, coupling or driver; see `EventImpulses`."""
         result, s = self._result, self._result.values.structure
         e = s.model[name]
         if e.category == "joints":
@@ -353,7 +353,7 @@ class ImpulseReactions(JointReactions):
         return float(result.multipliers[0, s.slices[name].start])
 
     def _of_contact(self, name: str) -> dict[str, float]:
-        """Its components; the first of its rows is the gap."""
+        """Return the components of a contact's impulse; the first of its rows is the gap."""
         result, s = self._result, self._result.values.structure
         gap = s.slices[name].start
         force = {True: np.zeros(3), False: np.zeros(3)}
@@ -368,7 +368,7 @@ class ImpulseReactions(JointReactions):
 
     @cached_property
     def by_element(self) -> dict[str, np.ndarray]:
-        """What every element does to every body: force, and torque about its centre of mass, (nb, 6, 1)."""
+        """Return the effect of every element on every body: force, and torque about its centre of mass, (nb, 6, 1)."""
         result, s = self._result, self._result.values.structure
         out = dict(self._by_rows)
         for name, tree in s.tree_joints.items():
@@ -378,7 +378,7 @@ class ImpulseReactions(JointReactions):
             apply_wrench(W, tree.child, 1.0, force, torque, at)
             if parent >= 0:
                 apply_wrench(W, parent, -1.0, force, torque, at)
-        for driver in s.prescribed:  # what passes through a joint is in part what its driver does
+        for driver in s.prescribed:  # the impulse through a joint includes that of its driver
             owner, what = s.model.coordinate(s.model[driver].coordinate, s.model[driver])
             force, torque = unit_effort_wrench(result, owner, what)
             effort = result.multipliers[:, s.slices[driver].start]
@@ -392,13 +392,13 @@ class ImpulseReactions(JointReactions):
 
     @cached_property
     def _by_rows(self) -> dict[str, np.ndarray]:
-        """The same of rows and of what was given."""
+        """Return the same for rows and for applied impulses."""
         result, s = self._result, self._result.values.structure
         out: dict[str, np.ndarray] = {}
         for k, t in enumerate(s.terms):
             if not t.measured:
                 self._push(out, reacting_element(t).name, k, result.multipliers[:, t.row])
-        for row, x in enumerate(s.rows):  # drivers whose laws follow what is measured
+        for row, x in enumerate(s.rows):  # drivers whose laws depend on measured quantities
             for slot in x.sensors:
                 self._along(out, x.element.name, slot, -result.multipliers[:, row] * self._slope(x.law, slot))
         for name, (kind, at, impulse, *more) in applied_by_event(self._blows).items():
@@ -410,26 +410,26 @@ class ImpulseReactions(JointReactions):
         return out
 
     def _onto(self, out: dict[str, np.ndarray], name: str) -> SimpleNamespace:
-        """Kinematics, and what an element does to the bodies so far, to be added to."""
+        """Return kinematics, and the accumulated effect of an element on the bodies."""
         records = self._result.records
         FB = out.setdefault(name, records.zeros(len(self._result.values.system.tree.parent), 6))
         return SimpleNamespace(BK=records.W.BK, FB=FB)
 
     def _along(self, out: dict[str, np.ndarray], name: str, slot: int, effort: np.ndarray) -> None:
-        """An impulse along a measured quantity."""
+        """Add an impulse along a measured quantity."""
         s = self._result.values.structure
         for k, t in enumerate(s.terms):
             if t.measured and t.row - len(s.rows) == slot:
                 self._push(out, name, k, effort)
 
     def _push(self, out: dict[str, np.ndarray], name: str, k: int, effort: np.ndarray) -> None:
-        """An impulse along term k."""
+        """Add an impulse along term k."""
         c = term_coefficient(self._result, k)
         if c != 0.0 and effort.any():
             self._term(self._onto(out, name), k, c * effort)
 
     def _inertial(self) -> SimpleNamespace:
-        """Kinematics, and the momentum that each body lost, about its centre of mass."""
+        """Return kinematics, and the momentum that each body lost, about its centre of mass."""
         S, records = self._result.values.system, self._result.records
         W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
         for b in range(len(S.tree.parent)):
@@ -440,7 +440,7 @@ class ImpulseReactions(JointReactions):
         return W
 
     def _acting(self) -> SimpleNamespace:
-        """The same with rows and what was given."""
+        """Return the same with rows and applied impulses."""
         W = self._inertial()
         for wrenches in self._by_rows.values():
             W.FB += wrenches

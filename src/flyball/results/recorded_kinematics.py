@@ -1,6 +1,7 @@
 """Kinematics at all output times: bodies and frames, terms of constraint rows, and measured quantities.
 
-Arrays over time by the formulas of the compiled engine: compiled for floats, in Python for complex numbers.
+Arrays over time are computed by the formulas of the compiled engine: compiled for floats, in Python for complex
+numbers.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ FULL_TURN = 2.0 * np.pi
 class RecordedMotion:
     """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number.
 
-    ``wound``: body -> whole turns [rad] that its coordinates count and its angle does not (`Result.wound`). Without
-    ``vdot`` nobody will ask for accelerations.
+    ``wound``: body -> full turns [rad] that its coordinates count and its angle does not (`Result.wound`). Without
+    ``vdot`` accelerations are not available.
     """
 
     def __init__(
@@ -71,13 +72,13 @@ class RecordedMotion:
         self._wound = wound or {}
 
     def zeros(self, *shape: int) -> np.ndarray:
-        """Nothing yet, at every time."""
+        """Return zeros at every time."""
         return np.zeros((*shape, self.n), self.dtype)
 
     def _accelerate(self, vdot: np.ndarray) -> None:
-        """Make the bias accelerations in W.BK true ones.
+        """Replace the bias accelerations in W.BK by true ones.
 
-        What is missing passes from parent to child as if they were one body, and every twist column adds its vdot.
+        The difference is transmitted from parent to child as in a rigid body, and every twist column adds its vdot.
         """
         S, W = self.x.system, self.W
         missing: list[tuple[tuple, tuple]] = []
@@ -118,11 +119,11 @@ class RecordedMotion:
         return self._frames[k]
 
     def forget(self) -> None:
-        """Keep no frames; they are found again when they are asked for."""
+        """Discard the cached frames; they are computed again on demand."""
         self._frames.clear()
 
     def carried(self, b: int, offset: tuple, turn: tuple) -> KinematicRecord:
-        """Record of a point and axes carried by body b (-1: ground)."""
+        """Return the record of a point and axes fixed on body b (-1: ground)."""
         if b >= 0:
             return attached_record(self.body(b), offset, turn)
         zero = self.zeros()
@@ -130,7 +131,7 @@ class RecordedMotion:
         return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
 
     def placed(self, name: str) -> tuple[int, tuple, tuple]:
-        """Body (-1: ground) that carries a named frame, or a body's own; its origin and axes on that body."""
+        """Return the body (-1: ground) with a named frame, or a body's own; its origin and axes on that body."""
         p, R = self.x.poses.named(name)
         e = self.x.structure.model[name]
         body = e.body if isinstance(e, Frame) else name
@@ -139,13 +140,13 @@ class RecordedMotion:
         return self.x.structure.place[body], tuple(offset.tolist()), tuple(turn.ravel().tolist())
 
     def named(self, name: str) -> KinematicRecord:
-        """Record of a named frame, or of a body's own frame."""
+        """Return the record of a named frame, or of a body's own frame."""
         return self.carried(*self.placed(name))
 
     def angle(self, b: int) -> np.ndarray:
-        """Turned angle [rad] of body b (-1: ground) of a planar mechanism, whole turns counted; (n,).
+        """Return the angle [rad] of body b (-1: ground) of a planar mechanism, with full turns; (n,).
 
-        It is the drawn angle in the drawn configuration and goes on from there, whichever coordinates are below.
+        It equals the given angle in the reference configuration and is continuous, for any choice of coordinates.
         """
         if b < 0:
             return self.zeros()
@@ -153,19 +154,18 @@ class RecordedMotion:
 
     @cached_property
     def _angles(self) -> dict[str, np.ndarray]:
-        """What the coordinates make of every body's angle."""
+        """Return every body's angle as given by the coordinates."""
         return turned_angles(self.x, self.W, self.q.T)
 
     def reference_angle(self, b: int) -> float:
-        """Angle [rad] of body b (-1: ground) of a planar mechanism as drawn, whole turns counted."""
+        """Return the reference angle [rad] of body b (-1: ground) of a planar mechanism, with full turns."""
         return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
 
 
 def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, float]) -> dict[str, float]:
-    """Whole turns that coordinates count and the angles of bodies do not.
+    """Return the full turns that coordinates count and the angles of bodies do not.
 
-    A joint that is told to begin two turns on has them in its coordinate where that is one of the mechanism's; the
-    bodies are no further on for it.
+    A joint with an initial angle of two turns includes them in its coordinate; the angles of bodies do not.
 
     Parameters
     ----------
@@ -177,14 +177,14 @@ def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, flo
     Returns
     -------
     dict
-        Body -> how far its coordinates are ahead [rad]; those that are not are left out.
+        Body -> excess of its coordinates [rad]; zeros are left out.
     """
     ahead = {k: FULL_TURN * round((coordinate_angles[k] - a) / FULL_TURN) for k, a in angles.items()}
     return {name: float(more) for name, more in ahead.items() if more != 0.0}
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
-    """(frame, extra turn or ()) twice: what a joint's coordinate is measured between, from its frames F and M."""
+    """(frame, extra rotation or ()) twice: the frames between which a joint's coordinate is measured, from F and M."""
     c = joint.coordinates[what]
     ends = []
     for role in c.frames:
@@ -194,7 +194,7 @@ def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, An
 
 
 def turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
-    """The record with its axes turned by a constant rotation, if there is one."""
+    """Return the record with its axes turned by a constant rotation, if there is one."""
     if not len(turn):
         return record
     return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])
@@ -204,10 +204,11 @@ Wrench = tuple[tuple, tuple]
 
 
 def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRecord, tuple]:
-    """Records of frames F and M of term k, and what its formula says of them.
+    """Return the records of frames F and M of term k, and the result of its formula.
 
-    That is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on F's
-    body, acceleration bias; without its coefficient. The records have no accelerations but those with every vdot zero.
+    The result is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on
+    F's body, acceleration bias; without its coefficient. The records have no accelerations but those with every vdot
+    zero.
     """
     x = result.values
     t = x.structure.terms[k]
@@ -222,7 +223,7 @@ def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRe
 def _time_by_time(
     row: Any, par: tuple, over: tuple[KinematicRecord, KinematicRecord, np.ndarray], const: np.ndarray
 ) -> tuple:
-    """What a formula gives at one time after another, as arrays over time."""
+    """Return a formula evaluated at one time after another, as arrays over time."""
     F, M, hint = over
     n = len(hint)
     sides = [[tuple(np.broadcast_to(np.stack(np.broadcast_arrays(*x), -1), (n, len(x)))) for x in r] for r in (F, M)]
@@ -233,12 +234,12 @@ def _time_by_time(
 
 
 def term_coefficient(result: Result, k: int) -> float:
-    """What term k counts in its row or measured quantity."""
+    """Return the coefficient of term k in its row or measured quantity."""
     return result.values.system.term_parameters[k, COEFFICIENT]
 
 
 def unit_effort_wrench(result: Result, joint: Joint, what: str) -> Wrench:
-    """Force and torque on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
+    """Return the wrench on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
     (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
     F, M = turned_record(result.motions.frame(i), turn_i), turned_record(result.motions.frame(j), turn_j)
     par = (*c.row.par[:6], 0.0, 0.0)
@@ -248,27 +249,27 @@ def unit_effort_wrench(result: Result, joint: Joint, what: str) -> Wrench:
 
 
 def zero_wrench(records: RecordedMotion) -> Wrench:
-    """No wrench at all, at every time."""
+    """Return a zero wrench at every time."""
     zero = records.zeros()
     return (zero,) * 3, (zero,) * 3
 
 
 class MeasuredQuantities:
-    """What forces act along and what laws name."""
+    """Quantities along which forces act and which laws use."""
 
     def __init__(self, result: Result) -> None:
         self._result = result
         self._known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def quantity(self, m: int) -> tuple[np.ndarray, np.ndarray]:
-        """Value and rate of quantity m over time."""
+        """Return value and rate of quantity m over time."""
         if m not in self._known:
             self._known[m] = self._found(m)
         return self._known[m]
 
     @cached_property
     def _terms(self) -> dict[int, list[int]]:
-        """Terms of every quantity."""
+        """Return the terms of every quantity."""
         s = self._result.values.structure
         out: dict[int, list[int]] = {m: [] for m in range(len(s.measured))}
         for k, t in enumerate(s.terms):
@@ -287,8 +288,10 @@ class MeasuredQuantities:
 
     @cached_property
     def slots(self) -> np.ndarray:
-        """What laws read: (3, slots, n): values, rates as values of their own, loads and forces (not these),
-        states of controllers, ways of switches.
+        """Return the inputs of laws, (3, slots, n).
+
+        They are values, rates as values of their own, loads and forces (not included), states of controllers, and
+        sliding directions of switches.
         """
         s = self._result.values.structure
         n, switches = len(s.measured), len(s.switches)

@@ -1,4 +1,4 @@
-"""`Result`: a motion read by name; and results of consecutive parts of a motion concatenated to one."""
+"""`Result`: a motion read by name; and concatenation of results of consecutive parts of a motion."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class OwnedLock:
-    """A lock that the thread which has it may take again; a copy or a pickle of its owner has one of its own."""
+    """A reentrant lock; a copy or a pickle of its owner gets a new one."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -50,8 +50,8 @@ class OwnedLock:
         return OwnedLock, ()
 
 
-SHOWN_CURVES = 12  # curves in a text
-_NO_PARENT: Any = None  # else a result and the output times that are a piece of it
+SHOWN_CURVES = 12  # number of curves in a text
+_NO_PARENT: Any = None  # a result, and the output times that are a piece of it
 DeferredArrays = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
@@ -71,22 +71,22 @@ class Result:
     health : Health
     energy : Energy
     wound : dict
-        Planar body -> whole turns [rad] that coordinates count and its angle does not (`recorded_kinematics.extra_turns`): those that a
-        joint was told to begin with.
+        Planar body -> full turns [rad] that coordinates count and its angle does not
+        (`recorded_kinematics.extra_turns`): turns in the initial angles of joints.
     contacts : Contacts
-        Where bodies touched and with which forces; None where the mechanism has no contact.
+        Contact points and forces; None if the mechanism has no contact.
     bulk : dict
         Set of bodies -> its motion (`BodySetMotion`); their members are read by ``result["balls[17]"]``.
     events : Events
-        What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
+        Events in the order of time: the model's events, impacts, sticking, locking and release.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy_balance.EXCHANGE_SIGNS`, and given by events.
-    begun : Begun
-        How it began, and what had been exchanged before.
+    begun : MotionStart
+        Initial state, and energies exchanged before.
     carried : dict
-        What a motion that goes on from it knows besides its end: how often events happened, for instance.
-    stretches : Stretches
-        What held between events: modes of what switches, parameters; None where nothing can switch.
+        Data for a continued motion besides the final state, such as the counts of events.
+    stretches : Phases
+        Modes of switches and parameters between events; None if nothing can switch.
     """
 
     def __init__(
@@ -104,10 +104,8 @@ class Result:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v, self._vdot, self._multipliers = t, q, v, vdot, multipliers
         self._turn, self._states = OwnedLock(), states
-        self.deferred_accelerations: DeferredArrays | None = (
-            None  # finds accelerations and multipliers that are not there yet
-        )
-        self.deferred_works: DeferredArrays | None = None  # finds works that are not there yet
+        self.deferred_accelerations: DeferredArrays | None = None  # computes accelerations and multipliers on demand
+        self.deferred_works: DeferredArrays | None = None  # computes works on demand
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
         self.contacts: Contacts | None = None
@@ -121,64 +119,64 @@ class Result:
 
     @property
     def vdot(self) -> np.ndarray:
-        """Accelerations, (n, nv): solved for when something first asks for them."""
+        """Accelerations, (n, nv), computed on demand."""
         self._solve()
         return self._vdot
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Of the constraint rows, then efforts of drivers that prescribe a coordinate."""
+        """Multipliers of the constraint rows, then efforts of drivers that prescribe a coordinate."""
         self._solve()
         return self._multipliers
 
     def _solve(self) -> None:
-        with self._turn:  # there is one scratch
+        with self._turn:  # there is only one workspace
             if (find := self.deferred_accelerations) is not None:
                 self._vdot, self._multipliers = find()
                 self.deferred_accelerations = None
 
     @property
     def events(self) -> Events:
-        """What happened at instants, in the order of time."""
+        """Events, in the order of time."""
         return self._events
 
     @events.setter
     def events(self, happened: Iterable[EventRecord]) -> None:
-        """Say what happened; states before and after are read by name from then on."""
+        """Set the events; states before and after can be read by name from then on."""
         self._events = Events(with_moments(list(happened), self), self)
         self.health.events = self._events.summary()
 
     @property
     def states(self) -> np.ndarray:
-        """Works of accounted elements, turned angles, places on curves, (n, nz)."""
+        """Works of elements, accumulated angles, positions on curves, (n, nz)."""
         self._settle()
         return self._states
 
     @property
     def hints(self) -> np.ndarray:
-        """The same, but works that are not there yet are not found: for those who want turns and places only."""
+        """The same without computing missing works, for angles and positions on curves only."""
         return self._states
 
     @property
     def final(self) -> tuple[float, np.ndarray]:
-        """Time and state vector to go on from."""
+        """Final time and state vector, for continuation."""
         self._settle()
         return self._final
 
     @final.setter
     def final(self, value: tuple[float, np.ndarray]) -> None:
-        """Say where the motion ended."""
+        """Set the final time and state."""
         self._final = value
 
-    def _settle(self) -> None:  # works of a motion that was followed, not integrated
+    def _settle(self) -> None:  # works of a prescribed motion, which was not integrated
         with self._turn:
-            if (find := self.deferred_works) is not None:  # owed still if it is interrupted
+            if (find := self.deferred_works) is not None:  # still to be done if it is interrupted
                 self._states, y = find()
                 self._final = (self._final[0], y)
                 self.deferred_works = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """All is found before it is pickled or copied: of what it is found with nothing goes along."""
+        """Complete the data before pickling or copying; the means of computing them are not included."""
         self._solve()
         self._settle()
         return vars(self)
@@ -190,7 +188,7 @@ class Result:
 
     @cached_property
     def pieces(self) -> tuple[Result, ...]:
-        """The motion piece by piece, if parameters changed in it, each with its own; else none."""
+        """The motion in pieces of constant parameters, if parameters changed; else none."""
         return split_by_parameters(self)
 
     @cached_property
@@ -200,26 +198,26 @@ class Result:
 
     @cached_property
     def motions(self) -> RecordedMotion:
-        """The same without the accelerations, which have to be solved for."""
+        """The same without accelerations, which have to be solved for."""
         return RecordedMotion(self.values, self.q, self.v, None, self.wound)
 
     @cached_property
     def measured(self) -> MeasuredQuantities:
-        """Quantities that forces act along and that laws name."""
+        """Quantities along which forces act and which laws use."""
         return MeasuredQuantities(self)
 
     @cached_property
     def reactions(self) -> JointReactions:
-        """Wrenches that joints carry."""
+        """Reaction wrenches of joints."""
         return JointReactions(self)
 
     def __getitem__(self, name: str) -> Any:
-        """A part by its name, or anything of it by ``"part.quantity"``.
+        """Return a part by its name, or one of its quantities by ``"part.quantity"``.
 
         Raises
         ------
         ModelError
-            If there is no such part or quantity; the message lists what there is.
+            If there is no such part or quantity; the message lists the existing ones.
         """
         if not isinstance(name, str):
             raise ModelError(
@@ -228,7 +226,7 @@ class Result:
         return self.channel(name)[1] if "." in name else self._view(name)
 
     def __contains__(self, name: object) -> bool:
-        """Whether there is a part, or a quantity, of that name."""
+        """Return whether there is a part, or a quantity, of that name."""
         owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
         if owner not in self.parts() and self._set_of(owner) is None:
             return False
@@ -251,7 +249,7 @@ class Result:
         return BodySetView(self, own) if k is None else SetMemberView(self, own, k)
 
     def _set_of(self, name: str) -> tuple[BodySetMotion, int | None] | None:
-        """The set of bodies of a name; of a member such as ``"balls[17]"`` its set and its number.
+        """Return the set of bodies of a name; for a member such as ``"balls[17]"`` its set and its index.
 
         Raises
         ------
@@ -269,11 +267,11 @@ class Result:
         return own, k
 
     def parts(self) -> list[str]:
-        """Names of all that the result says something of."""
+        """Names of all parts with quantities."""
         return [*(e.name for e in self.model.elements() if e.category == "bulk" or has_view(e)), ENERGY]
 
     def names(self) -> list[str]:
-        """Every name that ``result[name]`` knows: parts, and ``"part.quantity"``."""
+        """Every name that ``result[name]`` accepts: parts, and ``"part.quantity"``."""
         owners = self.parts()
         return [*owners, *(f"{name}.{k}" for name in owners for k in quantities(self.model, name))]
 
@@ -281,18 +279,18 @@ class Result:
         return self.names()
 
     def channel(self, name: str) -> tuple[str, np.ndarray]:
-        """(unit, values) of anything that a part has: a curve such as ``"slider.x"``, (n,), or ``"A.force"``, (n, k).
+        """Return (unit, values) of any quantity: a curve such as ``"slider.x"``, (n,), or ``"A.force"``, (n, k).
 
         Raises
         ------
         ModelError
-            If there is no such part or quantity; the message lists what there is.
+            If there is no such part or quantity; the message lists the existing ones.
         """
         owner, _, what = name.partition(".")
         return self._view(owner).quantity(what)
 
     def curve(self, name: str) -> tuple[str, np.ndarray]:
-        """(unit, values) of one number over time: a curve such as ``"slider.x"``, or a sensor by its name.
+        """Return (unit, values) of a scalar over time: a curve such as ``"slider.x"``, or a sensor by its name.
 
         Raises
         ------
@@ -307,12 +305,12 @@ class Result:
         return {f"{name}.{k}": c for name in self.parts() for k, c in self._view(name).channels().items()}
 
     def state_at_end(self, compiled: Any) -> np.ndarray:
-        """State vector to go on from.
+        """Return the final state vector, for continuation.
 
         Raises
         ------
         ModelError
-            If the mechanism it is wanted for has other coordinates.
+            If the other mechanism has different coordinates.
         """
         own, other = self.values.structure, compiled.structure
         if list(own.place) != list(other.place) or own.states != other.states or list(own.slices) != list(other.slices):
@@ -320,7 +318,7 @@ class Result:
         return self.final[1].copy()
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people: times, what the health says, and between which values the first curves stay."""
+        """Return labels and texts: times, health, and ranges of the first curves."""
         over = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
         out = [("motion", f"{self.model.name}, {over}"), *self.health.lines()]
         return out + [
@@ -328,7 +326,7 @@ class Result:
         ]
 
     def _telling(self) -> Curves:
-        """At most a dozen curves that say most: what sensors measure, efforts of drivers, coordinates of joints."""
+        """Return up to twelve of the most important curves: sensors, efforts of drivers, coordinates of joints."""
         m, planar = self.model, self.planar
         names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
         names += [f"{d.name}.effort" for d in m.drivers]
@@ -362,14 +360,14 @@ class Result:
         to_csv(self, path)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Everything, the model included, as one NetCDF file (.nc); ``flyball.load_result`` reads it back.
+        """Write everything, the model included, to one NetCDF file (.nc); ``flyball.load_result`` reads it back.
 
-        The ending says what is written: a path that ends in .csv or .html is written as by `to_csv` or `to_html`.
+        The extension selects the format: .csv and .html are written as by `to_csv` or `to_html`.
 
         Raises
         ------
         ModelError
-            If the ending is another, or the file cannot be written.
+            If the extension is unknown, or the file cannot be written.
         """
         from .files import save
 
@@ -436,9 +434,9 @@ class Result:
 
 
 def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
-    """The parts as one result at the output times that were asked for; the last row of the last part stays, too.
+    """Concatenate the parts to one result at the requested output times; the last row of the last part is kept, too.
 
-    Energies that each counts since its own start are added up. What its health tells late is for the caller to say.
+    Energies counted since the start of each part are accumulated. The caller sets the deferred figures of its health.
     """
     if len(parts) == 1:
         return parts[0]
@@ -447,7 +445,7 @@ def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
     if len(keep[-1]):
         keep[-1][-1] = True
     for p, mine, after in zip(parts, keep, parts[1:], strict=False):
-        if len(p.t) and len(after.t) and p.t[-1] == after.t[0]:  # what happened at that time is in the later one
+        if len(p.t) and len(after.t) and p.t[-1] == after.t[0]:  # the event at that time belongs to the later part
             mine[-1] = False
     t, *rows = (
         np.concatenate([getattr(p, name)[k] for p, k in zip(parts, keep, strict=True)])
@@ -473,7 +471,7 @@ def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
 
 
 class SharedTables:
-    """Tables of one structure by the parameters that they are made with: parts from files bring others of their own."""
+    """Tables of one structure by their parameters; parts read from files have tables of their own."""
 
     def __init__(self, x: Values) -> None:
         self._structure, self._all = x.structure, {self._key(x): x}
@@ -483,7 +481,7 @@ class SharedTables:
         return x.system.const[: len(x.structure.model.parameters)].tobytes()
 
     def __call__(self, x: Values) -> Values:
-        """The same numbers in the one structure, always the same object."""
+        """Return tables with the same numbers in the one structure, always the same object."""
         key = self._key(x)
         if key not in self._all:
             self._all[key] = x if x.structure is self._structure else values(self._structure, x.told)
@@ -515,7 +513,7 @@ def _joined_phases(parts: Sequence[Result], keep: Sequence[np.ndarray], known: S
 
 
 def _joined_exchanges(parts: Sequence[Result], keep: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
-    """What contacts exchanged since the start of all; the last row of a part is its end."""
+    """Return energies exchanged by contacts since the start of all parts; the last row of a part is its end."""
     out = {}
     for name in parts[-1].exchanged:
         rows, before = [], 0.0
@@ -528,7 +526,7 @@ def _joined_exchanges(parts: Sequence[Result], keep: Sequence[np.ndarray]) -> di
 
 
 def _joined_set(every: Sequence[BodySetMotion], keep: Sequence[np.ndarray]) -> BodySetMotion:
-    """Quaternions go on with the sign that they had."""
+    """Concatenate the motions of a set; quaternions stay continuous in sign."""
     turns = [every[0].quaternion]
     for b in every[1:]:
         q = b.quaternion
@@ -543,7 +541,7 @@ def _joined_set(every: Sequence[BodySetMotion], keep: Sequence[np.ndarray]) -> B
 
 
 def _unbound_event(h: EventRecord, known: SharedTables) -> EventRecord:
-    """What happened, as the motion knew it: its states are read in the whole."""
+    """Return an event without its result, so that its states are read in the concatenated one."""
     sides = [x.y if isinstance(x, Moment) else x for x in (h.before, h.after)]
     both = [known(x.values) for x in (h.before, h.after) if isinstance(x, Moment)]
     impulses = h.impulses.loose() if isinstance(h.impulses, EventImpulses) else h.impulses
@@ -567,7 +565,7 @@ def _joined_health(every: Sequence[Health]) -> Health:
 
 
 def _joined_method(every: Sequence[str]) -> str:
-    """By what each part went from when on; why it was not by another method is told once."""
+    """Join the methods of all parts and their start times; reasons against another method are given once."""
     told = every[0].split("; ")
     for words in (x for part in every[1:] for x in part.split("; ") if CHANGE_MARK in x):
         if words not in told and not (NO_CHANGE_MARK in words and any(NO_CHANGE_MARK in x for x in told)):
@@ -578,7 +576,7 @@ def _joined_method(every: Sequence[str]) -> str:
 CHANGE_MARK, NO_CHANGE_MARK = (
     " from t = ",
     ", though ",
-)  # how `Pace` tells a change of the method, and that there is none
+)  # text by which the stiffness monitor reports a change of the method, or none
 SUMMED_FIGURES = ("steps", "rejected", "evaluations", "factorisations", "seconds", "compiling")
 LARGEST_CONTACT_FIGURES = ("most", "worst_overlap", "residual", "force_residual")
 SUMMED_CONTACT_FIGURES = ("solves", "iterations", "unconverged", "halved", "reduced", "impacted")

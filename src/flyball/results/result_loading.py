@@ -1,4 +1,4 @@
-"""Reading of result files that `files` has written."""
+"""Reading of result files written by `files`."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ ModelType = TypeVar("ModelType", bound=Model)
 
 
 def read_result(path: str | os.PathLike, cls: type[ModelType]) -> Result:
-    """Rebuild a result, its mechanism being of class ``cls``; nothing is simulated and nothing compiled.
+    """Rebuild a result with a mechanism of class ``cls``; nothing is simulated or compiled.
 
     Raises
     ------
     ModelError
-        If there is no such file, it is no result of flyball, or it is damaged.
+        If there is no such file, it is not a result of flyball, or it is damaged.
     """
     path = Path(path)
     if not path.is_file():
@@ -51,7 +51,7 @@ def read_result(path: str | os.PathLike, cls: type[ModelType]) -> Result:
         result = _rebuild_result(stored, cls, where)
     except ModelError:
         raise
-    except Exception as error:  # whatever a file may hold
+    except Exception as error:  # for any content of the file
         raise _damaged_file_error(where, f"{type(error).__name__}: {error}") from None
     if kind < 3:
         late: dict[str, Any] = result.health.late
@@ -68,7 +68,7 @@ def _damaged_file_error(where: str, what: str) -> ModelError:
 
 
 def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
-    """Texts and arrays of the file's own group, and their format."""
+    """Return texts and arrays of the file's own group, and their format."""
     import h5netcdf
     import h5py
 
@@ -76,7 +76,7 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
         if is_sealed(path) is False:
             raise _damaged_file_error(os.fspath(path), "what it holds does not fit the checksum at its end")
         with h5py.File(path, "r") as whole:
-            dict(whole.attrs)  # h5netcdf leaves a file half open that fails here
+            dict(whole.attrs)  # h5netcdf leaves a file open if this fails
             file = h5netcdf.File(whole, "r")
             if OWN_GROUP in file.groups and "study" in file.groups[OWN_GROUP].attrs:
                 raise ModelError(f"{path} is a study, no result: read it with flyball.load_study")
@@ -91,7 +91,7 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
             stored = read_group(group)
     except ModelError:
         raise
-    except Exception as error:  # HDF5 and its wrappers fail in many ways on what is no such file, or no longer
+    except Exception as error:  # HDF5 and its wrappers raise many kinds of errors for invalid or damaged files
         raise ModelError(
             f"{path} cannot be read as a NetCDF result ({_first_line(error)}); {RESULT_FILE_REMEDY}"
         ) from None
@@ -105,12 +105,12 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
 
 
 def _first_line(error: Exception) -> str:
-    """What an error says, in one line."""
+    """Return an error's message in one line."""
     return next(iter(str(error).splitlines()), "") or type(error).__name__
 
 
 def _updated_model_text(model: str) -> str:
-    """The text of a model written when tables went on straight unless ``outside`` said something else."""
+    """Update the text of a model written when tables were extrapolated linearly unless ``outside`` was given."""
     parts = re.split(r"(?m)^(?=\[)", model)
     names = {"linear": "line", "hold": "hold", "periodic": "repeat"}
     for k, part in enumerate(parts):
@@ -164,7 +164,7 @@ def _rebuild_result(stored: dict[str, Any], cls: type[ModelType], where: str) ->
 
 
 def _read_health(data: dict[str, Any]) -> Health:
-    """Health as it was saved; what is found late is already known here."""
+    """Restore the saved health; deferred figures are already included."""
     known = {f.name for f in fields(Health)}
     found = SimpleNamespace(
         freedoms=data["freedoms"],

@@ -17,12 +17,13 @@ from .wording import json_numbers, without_rounding
 class Sensitivity:
     """Derivatives of named quantities with respect to named parameters.
 
-    ``s["slider.x", "crank"]`` is the derivative of one by the other: a number, or an array over the times of a motion.
+    ``s["slider.x", "crank"]`` is the derivative of the first with respect to the second: a number, or an array over the
+    times of a motion.
 
     Attributes
     ----------
     analysis : str
-        What the quantities are of: ``"motion"``, ``"instant"``, ``"equilibrium"`` or ``"modes"``.
+        Analysis of the quantities: ``"motion"``, ``"instant"``, ``"equilibrium"`` or ``"modes"``.
     of, to : tuple of str
     units : tuple of str
         Of the quantities, in SI; the parameters count in SI units too.
@@ -34,7 +35,7 @@ class Sensitivity:
         Complex for eigenvalues.
     derivatives : ndarray (n, of, to)
     verification : ndarray (n, of, to) or None
-        The same by central differences of the whole analysis, if asked for.
+        The derivatives by central differences of the whole analysis, if requested.
     """
 
     analysis: str
@@ -48,7 +49,7 @@ class Sensitivity:
     verification: np.ndarray | None = None
 
     def __getitem__(self, key: tuple[str, str] | str) -> Any:
-        """Derivative of a quantity by a parameter; of a quantity alone those by all parameters, as a dict.
+        """The derivative of a quantity with respect to a parameter; without a parameter those for all, as a dict.
 
         Raises
         ------
@@ -66,8 +67,9 @@ class Sensitivity:
 
     @property
     def difference(self) -> float:
-        """Largest difference between derivatives and verification, of the largest derivative of each quantity by each
-        parameter over time; nan if there is no verification.
+        """Return the largest difference between derivatives and verification, relative; nan without verification.
+
+        It is relative to the largest derivative over time of each quantity with respect to each parameter.
         """
         if self.verification is None:
             return float("nan")
@@ -143,14 +145,14 @@ class Optimum:
     message : str
         Why the search ended.
     evaluations : int
-        Analyses that were made.
+        Number of analyses.
     of, units : tuple of str
         The quantities, and their units.
     t : ndarray (n,) [s]
     values, start_values : ndarray (n, of)
         The quantities at the optimum, and where the search began.
     target : ndarray (n, of) or None
-        What they should be; None where a function was minimised.
+        Target values; None if a function was minimised.
     at_bound : tuple of str
         Parameters that ended at one of their bounds.
     """

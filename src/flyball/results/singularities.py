@@ -13,11 +13,11 @@ import numpy as np
 from .wording import SELF_MOTION
 
 NEGLIGIBLE_PART = 1e-7  # numbers below this part of the largest are printed as zero
-MAX_COMPONENTS = 6  # coordinates of a vector that are printed
+MAX_COMPONENTS = 6  # number of printed coordinates of a vector
 
 
 class Motion(NamedTuple):
-    """What one branch does when the driver moves so: finite velocities and accelerations at the singular position."""
+    """Motion of one branch for a given driver motion: finite velocities and accelerations at the singular position."""
 
     branch: int
     rate: float  # a' of the driver's coordinate [1/s times its unit]
@@ -34,12 +34,12 @@ class Branch:
     ----------
     what : str
         ``"passes"``: the driver moves along it. ``"turns back"``: the driver has an extremum. ``"passes, unbounded"``:
-        the driver passes, at velocities without bound. ``"self-motion"``: the driver stays. ``"cusp"``: it goes
-        one way only, on two halves with one tangent.
+        the driver passes, at velocities without bound. ``"self-motion"``: the driver does not move. ``"cusp"``: the
+        driver moves in one direction only, on two halves with a common tangent.
     order : int
-        Order of the driver's first derivative along it that is not zero; 0 if there is none.
+        Order of the driver's first nonzero derivative along it; 0 if there is none.
     side : int
-        Where the driver turns back: +1 if it has values above only, -1 below only; else 0.
+        If the driver turns back: +1 if it has larger values only, -1 smaller values only; else 0.
     tangent : dict
         Rates of coordinates and bodies along it, for a' = 1 where the driver passes, else the largest one 1.
     """
@@ -63,26 +63,27 @@ class Singularity:
         ``"regular passage"``: one branch on which the driver moves. ``"bifurcation"``: several. ``"lock-up"``: none.
         ``"self-motion"``: none, and the mechanism can move while the driver stands still.
     isolated : bool
-        Whether nothing leads away from it.
+        Whether no branch leads away from it.
     self_motion : bool
-        Whether some branch is one along which the driver stands still.
+        Whether the driver is at rest along some branch.
     lost : int
-        How many dimensions of rank the driven Jacobian loses.
+        Rank deficiency of the driven Jacobian.
     branch_point : bool
         Whether the Jacobian extended by the driver loses rank too; otherwise the curve has one tangent here.
     coordinates : dict
-        Where the mechanism is: coordinates of joints and bodies [rad] or [m].
+        Position: coordinates of joints and bodies [rad] or [m].
     null_vectors : list of dict
         Instantaneous motions with the driver held: rates, the largest one 1.
     left_null_vectors : list of dict
-        Rows of joints (and the driver) that lose their independence, the largest factor 1.
+        Constraint rows of joints (and the driver) that become dependent, the largest factor 1.
     branches : list of Branch
     motions : list of Motion
         All finite motions for a' = 1 (a'' = 0), and for a' = 0 with a'' = 1 and -1.
     decided : bool
-        False if derivatives of second order leave the branches open; those there are were found at small distances.
+        False if derivatives of second order do not determine the branches; these were then found at small distances.
     endless : tuple of str
-        Drives (``"a'"``, ``"a'' > 0"``, ``"a'' < 0"``) that infinitely many directions answer: more freedoms meet here.
+        Driver motions (``"a'"``, ``"a'' > 0"``, ``"a'' < 0"``) with infinitely many solutions: more degrees of freedom
+        meet here.
     """
 
     a: float
@@ -104,7 +105,7 @@ class Singularity:
     def count(self, rate: float = 0.0, acceleration: float = 0.0) -> float:
         """Number of finite motions if the driver moves with a' = ``rate`` (not 0), or from rest with a''.
 
-        Infinite where infinitely many directions lead away.
+        Infinite if infinitely many directions lead away.
         """
         if ("a'" if rate else "a'' > 0" if acceleration > 0.0 else "a'' < 0") in self.endless:
             return math.inf
@@ -113,7 +114,7 @@ class Singularity:
         return sum(m.rate == 0.0 and m.acceleration * acceleration > 0.0 for m in self.motions)
 
     def lines(self, unit: str = "", order: list[str] | None = None) -> Iterator[tuple[str, str]]:
-        """Label and text of what a reader wants to see."""
+        """Return labels and texts of the summary."""
         counts = [self.count(rate=1.0), self.count(acceleration=1.0), self.count(acceleration=-1.0)]
         told = ", ".join(f"{n:g} for {w}" for n, w in zip(counts, ("a' = 1", "a'' = 1", "a'' = -1"), strict=True))
         more = "; self-motion with the driver held" if self.self_motion and self.kind != SELF_MOTION else ""
@@ -158,7 +159,7 @@ class Singularities:
     s : ndarray (n,)
         Arc length along the curve from the start [1], lengths divided by the mechanism's.
     a : ndarray (n,)
-        The driver's coordinate along the curve; it goes back where the driver does.
+        The driver's coordinate along the curve; not monotonic if the driver turns back.
     values : dict
         Every coordinate along the curve, (n,) [rad] or [m].
     distance : ndarray (n,)
@@ -195,7 +196,7 @@ class Singularities:
         return float(self.a.min()), float(self.a.max())
 
     def lines(self) -> list[tuple[str, str]]:
-        """Label and text of what a reader wants to see first."""
+        """Return labels and texts of the summary."""
         low, high = (coordinate_text(x, self.unit) for x in self.reached)
         out = [
             ("driver", f"{self.driver!r} of {self.coordinate}, of {self.model!r}"),
@@ -212,7 +213,7 @@ class Singularities:
         return "; ".join(dict.fromkeys(e for e in self.ends if e))
 
     def table(self) -> str:
-        """One line a singular position."""
+        """Return one line for each singular position."""
         head = ("a", "kind", "lost", "a' = 1", "a'' = 1", "a'' = -1", "branches")
         rows = [
             (
@@ -243,7 +244,7 @@ class Singularities:
         path : path, optional
             Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
         coordinate : str, optional
-            What is drawn over the driver's coordinate; by default what moves most.
+            Coordinate drawn over the driver's; by default the one that moves most.
         """
         from ..view.singularity_plots import singularity_plot
 
@@ -255,13 +256,13 @@ class Singularities:
 
 
 def coordinate_text(x: float, unit: str) -> str:
-    """A value with its unit; radians in degrees too."""
+    """Return a value with its unit; angles in degrees too."""
     x = 0.0 if abs(x) < 1e-12 else x
     return f"{x:.6g} rad ({math.degrees(x):.6g} deg)" if unit == "rad" else f"{x:.6g} {unit}"
 
 
 def vector_text(numbers: Mapping[str, float]) -> str:
-    """The largest components, by name."""
+    """Return the largest components, by name."""
     largest = max((abs(x) for x in numbers.values()), default=0.0)
     shown = {k: x for k, x in numbers.items() if abs(x) > NEGLIGIBLE_PART * max(largest, 1e-300)}
     names = [k for k in shown if "." in k]

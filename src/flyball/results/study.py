@@ -1,7 +1,7 @@
 """Many runs of one model at different parameter values: the study, Sobol' indices, and study files.
 
-`Study` holds the quantities of all runs. Its file is NetCDF; a fingerprint tells whether a file belongs to the
-same study, so that an interrupted one can go on.
+`Study` contains the quantities of all runs. Its file is NetCDF; a fingerprint identifies the study, so that an
+interrupted one can be continued from its file.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ RESAMPLES = 499  # bootstrap samples
 
 @dataclass(frozen=True, repr=False)
 class Indices:
-    """Parts of the variance of each quantity that parameters account for.
+    """Sobol' indices: parts of the variance of each quantity due to each parameter.
 
     Attributes
     ----------
     of, parameters : tuple of str
     samples : int
-        How many they are found from: a power of two.
+        Number of samples used: a power of two.
     left_out : int
-        How many more there are of which one run failed.
+        Number of samples left out because a run failed.
     first : ndarray (of, parameters) [1]
-        By itself: how much smaller the variance would be on average if the parameter were known.
+        First-order indices: mean relative reduction of the variance if the parameter were known.
     total : ndarray (of, parameters) [1]
-        With all its interactions: what would be left of the variance if all others were known.
+        Total indices, with all interactions: mean relative variance left if all other parameters were known.
     first_range, total_range : ndarray (of, parameters, 2)
-        Between which bounds they are with 95 % confidence, by resampling (BCa bootstrap); nan where nothing varies.
+        Bounds of 95 % confidence, by resampling (BCa bootstrap); nan if nothing varies.
     """
 
     of: tuple[str, ...]
@@ -65,8 +65,10 @@ class Indices:
 
     @classmethod
     def of_runs(cls, of: tuple[str, ...], parameters: tuple[str, ...], y: np.ndarray) -> Indices:
-        """From y (of, 2 + parameters, samples): the samples A, B, and A with one column of B each; nan where a run
-        failed. SciPy's estimators take a power of two of samples: of those that are whole as many as that.
+        """Compute the indices from y (of, 2 + parameters, samples), nan where a run failed.
+
+        y contains the samples A, B, and A with one column of B each. SciPy's estimators require a power of two of
+        samples: as many complete samples are used.
         """
         whole = np.isfinite(y).all(axis=(0, 1))
         left = int(whole.sum())
@@ -128,7 +130,7 @@ class Indices:
 
 
 def _estimate_indices(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Indices of one quantity, and their ranges, by SciPy's estimators; of a power of two of samples."""
+    """Return the indices of one quantity, and their bounds, by SciPy's estimators, for a power of two of samples."""
     import warnings
 
     from scipy.stats import sobol_indices
@@ -138,7 +140,7 @@ def _estimate_indices(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
         return np.zeros(d), np.zeros(d), np.full((d, 2), np.nan), np.full((d, 2), np.nan)
     found = sobol_indices(func={"f_A": y[:1], "f_B": y[1:2], "f_AB": y[2:, None, :]}, n=n)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a parameter that changes nothing the bounds are not defined
+        warnings.simplefilter("ignore")  # the bounds are undefined for a parameter without effect
         spread = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
     ranges = [
         np.stack([np.ravel(x.confidence_interval.low), np.ravel(x.confidence_interval.high)], axis=1)
@@ -151,7 +153,7 @@ STUDY_FORMAT = 1
 RUN_DIMENSION, TIME_DIMENSION = "run", "time"
 DOUBTFUL_ATTRIBUTES = {"comment": "1: done, but perhaps not what its tolerance asks for"}
 TEXTS_BY_RUN = ("reasons", "remarks", "doubtful")
-"""Texts by the numbers of runs."""
+"""Texts by the number of the run."""
 STORED_FIELDS = (
     "name",
     "design",
@@ -188,7 +190,7 @@ def study_to_xarray(study: Study) -> xarray.Dataset:
 
 
 def _doubtful_flags(study: Study) -> np.ndarray:
-    """Which runs are doubtful, (runs,) of 0 and 1."""
+    """Return which runs are doubtful, (runs,) of 0 and 1."""
     out = np.zeros(len(study), np.int8)
     out[list(study.doubtful)] = 1
     return out
@@ -201,7 +203,7 @@ def _dataset_attributes(study: Study) -> dict[str, str]:
 
 
 def save_study(study: Study, path: str | os.PathLike) -> None:
-    """Write it to one NetCDF file: beside the file that may be there, which it then replaces."""
+    """Write the study to one NetCDF file, through a temporary file that replaces an existing one."""
     write_file(path, sealed_file_bytes(lambda file: _write_study(study, file)))
 
 
@@ -236,14 +238,14 @@ def _option_data(x: Any) -> Any:
 
 
 def variable_name(name: str) -> str:
-    """A name that a variable of a file may have."""
+    """Return a valid name of a variable of a file."""
     return name.replace("/", SLASH_SUBSTITUTE)
 
 
 NOT_RUN, DONE, FAILED = 0, 1, 2
 STATUS_TEXTS, DOUBTFUL_TEXT = ("still to be done", "done", "failed"), "done, but doubtful"
-TIME_OPTIONS = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option that its output times are
-MAX_TEXTS = 6  # reasons in a text
+TIME_OPTIONS = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option with its output times
+MAX_TEXTS = 6  # number of reasons in a text
 NOT_SALTELLI = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
 
 
@@ -251,18 +253,18 @@ NOT_SALTELLI = "only the runs of design='saltelli' tell indices; this is a study
 class Study:
     """Quantities of many runs, by the values of the parameters.
 
-    ``study["max(slider.x)"]`` is a quantity of all runs: an array with an axis for each parameter of a grid, else with
-    one for the runs; behind it one for the times of a curve. nan where a run failed or is still to be done.
+    ``study["max(slider.x)"]`` is a quantity of all runs: an array with an axis for each parameter of a grid, else one
+    axis for the runs; for curves the last axis is time. nan if a run failed or is still to be done.
 
     Attributes
     ----------
     design : str
     parameters : tuple of str
-        Those that were varied.
+        The varied parameters.
     analysis : str
-        What each run is.
+        The analysis of each run.
     points : ndarray (runs, parameters)
-        Their values in each run, in SI units; of a grid the last one changes first.
+        Their values in each run, in SI units; for a grid the last one changes first.
     axes : tuple of ndarray
         Their values along each axis of a grid; empty for other designs.
     of, units : tuple of str
@@ -278,16 +280,16 @@ class Study:
     remarks : dict of int to str
         What was noted about runs that are done.
     doubtful : dict of int to str
-        Why runs that are done may not be what their tolerance asks for (`Health.doubtful`); it is among their remarks.
+        Why completed runs may not satisfy their tolerance (`Health.doubtful`); also part of their remarks.
     options : dict
         How each run was computed.
     base : dict
-        What the model says of the parameters that were varied.
+        Values of the varied parameters in the model.
     start : Result or None
-        What all runs went on from.
+        Initial state of all runs.
     seconds : float
     message : str
-        Why it ended before its time; empty if it did not.
+        Why it ended prematurely; empty if it did not.
     """
 
     name: str
@@ -322,7 +324,7 @@ class Study:
 
     @property
     def words(self) -> np.ndarray:
-        """How each run is, (runs,) of str: done; done, but doubtful; failed; or still to be done."""
+        """State of each run, (runs,) of str: done; done, but doubtful; failed; or still to be done."""
         out = np.array(STATUS_TEXTS, object)[self.status]
         out[list(self.doubtful)] = DOUBTFUL_TEXT
         return out.astype(str)
@@ -368,11 +370,12 @@ class Study:
         return dict(zip(self.parameters, self.points[run].tolist(), strict=True))
 
     def question(self, run: int) -> dict[str, Any]:
-        """What to ask the analysis for the same answer, to the last bit: ``m.simulate(**study.question(17))``.
+        """The arguments of the analysis that reproduce a run to the last bit: ``m.simulate(**study.question(17))``.
 
-        Of ``"kinematics"`` and ``"equilibrium"`` what to ask those; of ``"modes"`` and ``"linearize"`` where they are
-        drawn too; about the equilibrium what to ask that one, which then is ``about=``. Of ``"instant"`` the question
-        is for `assemble`, of a function of your own it has ``parameters`` alone.
+        For ``"kinematics"`` and ``"equilibrium"`` they are arguments of these methods; also for ``"modes"`` and
+        ``"linearize"`` about the assembled position. About the equilibrium they are arguments of `equilibrium`, whose
+        result is then passed as ``about=``. For ``"instant"`` they are arguments of `assemble`; for a user's function
+        ``parameters`` only.
         """
         told = {k: x for k, x in self.options.items() if x not in (None, ()) and k != "about"}
         told["parameters"] = {**self.options["parameters"], **self.at(run)}
@@ -383,16 +386,16 @@ class Study:
         return told | ({} if self.start is None else {"start": self.start})
 
     def indices(self, *of: str) -> Indices:
-        """Sobol' indices: which part of the variance of each quantity each parameter accounts for.
+        """Return the Sobol' indices: the part of the variance of each quantity due to each parameter.
 
-        By SciPy's ``sobol_indices``: first-order and total indices (Saltelli et al., Computer Physics Communications
-        181, 2010). A sample of which one run failed is left out with all its runs, and `Indices.left_out` counts
-        them.
+        They are computed by SciPy's ``sobol_indices``: first-order and total indices (Saltelli et al., Computer Physics
+        Communications 181, 2010). A sample with a failed run is left out with all its runs, and `Indices.left_out`
+        counts them.
 
         Parameters
         ----------
         of : str
-            Quantities; all that are one number a run if none is named.
+            Quantities; all scalar ones if none is named.
 
         Returns
         -------
@@ -415,7 +418,7 @@ class Study:
         return Indices.of_runs(names, self.parameters, y)
 
     def lines(self) -> list[tuple[str, str]]:
-        """A table for people: what was varied, how the quantities spread, and what failed."""
+        """Return a table: varied parameters, range of the quantities, and failed runs."""
         done, failed = int(self.done.sum()), int((self.status == FAILED).sum())
         sizes = " x ".join(map(str, self.shape)) if self.axes else f"{len(self)} runs"
         what = "" if self.analysis == "motion" else f"{self.analysis}, "
@@ -429,7 +432,7 @@ class Study:
             out.append((name, f"{range_text(self.points[:, k])} (in the model {self.base[name]:.6g})"))
         for name, unit in zip(self.of, self.units, strict=True):
             y = self.values[name][self.done]
-            none = int((~np.isfinite(y)).sum()) if y.ndim == 1 else 0  # curves are none where a motion ended before
+            none = int((~np.isfinite(y)).sum()) if y.ndim == 1 else 0  # curves are missing if a motion ended before
             missed = [f"{none} of {len(y)} runs have no number"] if none else []
             y = y[np.isfinite(y)]
             if len(y):
@@ -481,13 +484,13 @@ class Study:
         }
 
     def to_xarray(self) -> xarray.Dataset:
-        """A labelled dataset: of a grid by the parameters, else by runs with the parameters as coordinates."""
+        """Return a labelled dataset: for a grid by the parameters, else by runs with the parameters as coordinates."""
         return study_to_xarray(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """A table with a row for each run: parameters, and the quantities that are one number.
+        """Return a table with a row for each run: parameters, and scalar quantities.
 
-        ``attrs["doubtful"]`` are the numbers of the runs that are.
+        ``attrs["doubtful"]`` are the numbers of doubtful runs.
         """
         import pandas as pd
 
@@ -510,10 +513,10 @@ class Study:
             save_study(self, path)
 
     def plot(self, *of: str, path: str | os.PathLike | None = None) -> Any:
-        """Quantities over one parameter, as a surface over two, or scattered over each of more.
+        """Plot quantities over one parameter, as a surface over two, or scattered over each of more.
 
-        Curves of few runs are told by a legend, of up to 40 by the colour of the parameter that tells most of them; of
-        more, what half and nine tenths of the runs stay within. Axes are logarithmic where values are spread so.
+        Curves of few runs have a legend; those of up to 40 runs are coloured by the most influential parameter; for
+        more runs the 50 % and 90 % ranges are drawn. Axes are logarithmic if values are distributed accordingly.
         Returns the Matplotlib figure, or writes it to ``path``.
         """
         from ..view.study_plots import study
@@ -554,7 +557,7 @@ def study_fingerprint(
     quantities: Sequence[tuple[str, Callable | None]],
     times: np.ndarray,
 ) -> str:
-    """Hash of all that a study is asked: two with the same one have the same runs."""
+    """Return a hash of all inputs of a study: two studies with the same hash have the same runs."""
     from .. import __version__
 
     digest = hashlib.sha256(f"{__version__}\n{dumps(model)}".encode())
@@ -574,12 +577,12 @@ def study_fingerprint(
 
 
 def load_study_file(path: str | os.PathLike, mark: str | None = None) -> Study:
-    """Read a study from its file. With ``mark``: to go on with that study.
+    """Read a study from its file; with ``mark``, the fingerprint of the study to be continued.
 
     Raises
     ------
     ModelError
-        If the file is damaged, is no study, or is of another one.
+        If the file is damaged, is not a study, or belongs to another one.
     """
     path = Path(path)
     if not path.exists():

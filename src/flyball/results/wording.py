@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 PASSAGE, LOCK_UP, BIFURCATION, SELF_MOTION = "regular passage", "lock-up", "bifurcation", "self-motion"
-"""Of singular positions."""
+"""Kinds of singular positions."""
 
 INSTANT_KINDS = ("event", "impact", "kick", "jam", "rest", "turn", "hold", "leave")
 SWITCH_KINDS = (
@@ -29,14 +29,14 @@ SWITCH_KINDS = (
     "part",
 )
 EVENT_KINDS = frozenset((*INSTANT_KINDS, *SWITCH_KINDS))
-"""What happenings may be."""
+"""Kinds of events."""
 
 
-NEGLIGIBLE = 1e-10  # part of the size of its kind below which a number is what rounding, or an iteration, left
+NEGLIGIBLE = 1e-10  # relative to the size of its kind: smaller numbers are rounding or iteration errors
 
 
 def without_rounding(values: Any, size: float | None = None) -> np.ndarray:
-    """The values, with 0 for those that are nothing beside ``size`` (the largest of them, if not given)."""
+    """Return the values, with 0 for those negligible beside ``size`` (the largest of them, if not given)."""
     a = np.asarray(values)
     known = np.abs(a[np.isfinite(a)])
     size = float(known.max(initial=0.0)) if size is None else size
@@ -45,27 +45,27 @@ def without_rounding(values: Any, size: float | None = None) -> np.ndarray:
 
 
 def number_text(x: float, size: float | None = None, digits: int = 6) -> str:
-    """One number, or 0 where it is nothing beside ``size``."""
+    """Return a number as text; 0 if it is negligible beside ``size``."""
     return f"{float(without_rounding([x], size)[0]):.{digits}g}"
 
 
 def tuple_text(values: Sequence[float] | np.ndarray, digits: int = 4, size: float | None = None) -> str:
-    """Components of a vector: ``(0, 0, 6.283)``."""
+    """Return components of a vector as text: ``(0, 0, 6.283)``."""
     return f"({', '.join(f'{x:.{digits}g}' for x in without_rounding(values, size).tolist())})"
 
 
 def range_text(values: np.ndarray, digits: int = 4, size: float | None = None) -> str:
-    """From the least to the largest of a series, those that are not a number left out; one number if it is constant."""
+    """Return the range of a series as text, without nan; one number if it is constant."""
     a = without_rounding(values, size)
     low, high = (f"{f(a):.{digits}g}" for f in (np.nanmin, np.nanmax))
     return low if low == high else f"{low} to {high}"
 
 
 def with_unit(name: str, unit: str) -> str:
-    """``A.angle [rad]``; the name alone of what has no unit, the unit alone where the name stands elsewhere."""
+    """Return ``A.angle [rad]``; the name alone without a unit, the unit alone without a name."""
     return f"{name} [{unit}]".strip() if unit else name
 
 
 def json_numbers(values: np.ndarray) -> list:
-    """Numbers as plain data: a complex one as its real and imaginary part."""
+    """Convert numbers to plain data: a complex one to its real and imaginary part."""
     return values.tolist() if np.isrealobj(values) else [[float(z.real), float(z.imag)] for z in values]

@@ -27,7 +27,7 @@ Bounds = Mapping[str, tuple[float | str | None, float | str | None]]
 
 @dataclass(frozen=True, kw_only=True)
 class OptimizeOptions(DerivativeOptions):
-    """What `Mechanism.optimize` is asked."""
+    """Arguments of `Mechanism.optimize`."""
 
     of: tuple[str, ...]
     to: Sequence[str] | Bounds

@@ -112,8 +112,10 @@ def difference_derivative(
     for _ in range(MAX_STEP_CHANGES):
         try:
             error, found_, rounded = at(h)
-        except (AnalysisError, ModelError) as error_:  # of a model: what a parameter so far off makes of it is none
-            if type(error_) is AnalysisError:  # what is asked for is not there aside: no smaller step makes it so
+        # ModelError: the model is invalid with so large a change of the parameter.
+        except (AnalysisError, ModelError) as error_:
+            # The quantity does not exist at other values: a smaller step does not help.
+            if type(error_) is AnalysisError:
                 raise AnalysisError(f"a little to the side of {name!r} = {value:g}, {error_}") from None
             if way > 1.0:
                 break
@@ -306,7 +308,7 @@ def _refuse_inconsistent(d: ParameterDirection, x: MechanismState, before: np.nd
 def consistent_derivative(
     d: ParameterDirection, x: MechanismState, lin: ConstrainedSystem, dq: np.ndarray, dv: np.ndarray
 ) -> StateDerivative:
-    """State derivative with the changes of positions and velocities nearest to the given ones that keep the constraints."""
+    """State derivative whose position and velocity changes are nearest to the given ones and keep the constraints."""
     at = d.e.at
     dq, dv = consistent_changes(d, x, lin, dq, dv)
     left = d.along(x, dq, dv)

@@ -168,8 +168,7 @@ def deferred_interrupt(part: Segment) -> Iterator[None]:
     """Let a keyboard interrupt end a long segment in order, at its present time.
 
     A second interrupt, or one of a segment that has run only briefly, raises at once. Where another handler is
-    installed,
-    or outside the main thread, nothing is changed.
+    installed, or outside the main thread, nothing is changed.
     """
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -223,11 +222,7 @@ class CheckpointFile:
         self.path, self.mark, self.times = path, mark, times
         self.parts: list[Result] = []
         self.by = ""
-        self._run, self._count, self._written = (
-            uuid.uuid4().hex,
-            0,
-            0,
-        )  # number of segments, and of those already written
+        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # number of segments, and of those in files
         self._first = self._rows_beside = 0  # output times in the first file, and in the segment files
         self._files: list[Path] = []
         self._last = time.monotonic()
@@ -334,9 +329,7 @@ def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
         return result
     health = result.health
     health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
-    if isinstance(
-        health.options.get("method"), Mapping
-    ):  # accelerations of impulse time stepping are mean values over steps
+    if isinstance(health.options.get("method"), Mapping):  # impulse stepping: accelerations are means
         health.late |= {
             "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
             "warnings": partial(diagnostics.impulse_stepping_warnings, result),

@@ -65,7 +65,8 @@ def jam_message(e: Any, t: float, single: bool) -> str:
         )
     if isinstance(e, Touch):
         return (
-            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes itself "
+            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there grows with the load that it "
+            "makes itself "
             f"faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With less "
             f"friction, or contact that gives way (law=), there is a solution; steps by impulses go over it"
         )
@@ -135,7 +136,8 @@ def rounding_error_remark(clock: ex.StepState) -> str:
     if not size > NOTABLE:
         return ""
     return (
-        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to a singular "
+        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to "
+        "a singular "
         f"position, the last digits of the state alone change a step by up to {size:.2g} times what "
         f"rtol = {clock.real.rtol:g} allows. The step was accepted so; a larger rtol asks for what can be had"
     )
@@ -231,8 +233,7 @@ def acceleration_residual(
     own.
 
     Rows in metres are divided by the mechanism's length. The state (velocities v) is the one in c's workspace,
-    evaluated
-    with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
     S, n = c.values.system, len(c.structure.rows)
     row_p = S.row_start[: n + 1]
@@ -358,7 +359,7 @@ def driver_fault(c: CompiledMechanism, t: float, span: float) -> str:
 
 
 def reason_without_solution(c: CompiledMechanism, t: float, span: float) -> str:
-    """Return why the equations of motion have no solution at the state evaluated last; ``span`` as in `driver_fault`."""
+    """Return why the equations of motion have no solution at the last state; ``span`` as in `driver_fault`."""
     stack = c.work.stack
     found = function_fault(stack, c.structure.functions) or c.structure.missed(stack)
     text = found.message if found else driver_fault(c, t, span) or force_fault(c, t) or _controller_fault(c, t)
@@ -423,7 +424,8 @@ def _unbounded_derivative(near: list[tuple], when: str) -> str:
         if all(x > GROWTH_FACTOR * y for x, y in pairwise(sizes)):
             return (
                 f"has a {what} that grows without bound just {when}, which asks for an infinite "
-                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite derivatives (a power "
+                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite "
+                "derivatives (a power "
                 f"of what becomes zero: an exponent of 2 or more), or step5, which goes over smoothly"
             )
     return ""
@@ -440,7 +442,8 @@ def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str
         slope = max(abs(before[k + 1]), abs(after[k + 1]))
         if abs(change) > JUMP_FACTOR * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
             return (
-                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an infinite force; "
+                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an "
+                "infinite force; "
                 f"{remedy}"
             )
     return ""
@@ -543,7 +546,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
 
 
 def _controller_fault(c: CompiledMechanism, t: float) -> str:
-    """Return a message on a controller whose state has no finite rate at the measured values; empty if there is none."""
+    """Return a message on a controller whose state has no finite rate at the measured values; empty if none."""
     for x in c.structure.controls:
         if part := undefined_law_part(c, x.controller, t):
             law = abbreviated(tree_text(x.law.tree))

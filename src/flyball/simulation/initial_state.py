@@ -153,7 +153,8 @@ def _sound_forest(
             return c, ""
         if bad not in c.structure.tree_joints:
             return None, (
-                f"{bad} has no inertia, or less than {THIN_INERTIA:g} of that of the whole mass at the mechanism's length, "
+                f"{bad} has no inertia, or less than {THIN_INERTIA:g} of that of the whole mass at the "
+                "mechanism's length, "
                 f"and no joint that could be a tree joint"
             )
         avoided.append(bad)
@@ -263,10 +264,8 @@ def find_initial_state(
     """Assemble the mechanism, or continue an earlier result, and choose the coordinates.
 
     With ``switches`` the tables contain rows for all switches (stops, stick friction, locks), all inactive. Without
-    them
-    none exist, and friction follows the sign of the rate. ``part`` is the segment of the motion: a later segment has
-    the
-    coordinates and parameters of the one before it.
+    them none exist, and friction follows the sign of the rate. ``part`` is the segment of the motion: a later segment
+    has the coordinates and parameters of the one before it.
 
     Raises
     ------
@@ -493,7 +492,7 @@ def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v
 
 
 def _body_states(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
-    """How every body moves, where prescribed coordinates are what drivers want then."""
+    """Return pose and velocity of every body, with prescribed coordinates at their prescribed values."""
     c.at(t, q, v, MOTION)
     K = c.work.BK.copy()
     return {
@@ -533,8 +532,7 @@ def choose_independent(model: Model, start: InitialState) -> None:
     """Choose the dependent coordinates for coordinate partitioning, and set the coordinate scales.
 
     Their number is the rank of the constraint Jacobian at the start. QR with column pivoting selects them first;
-    lengths
-    are scaled by the mechanism's length and rows normalized to unit vectors (Businger and Golub 1965).
+    lengths are scaled by the mechanism's length and rows normalized to unit vectors (Businger and Golub 1965).
     """
     from scipy.linalg import qr
 

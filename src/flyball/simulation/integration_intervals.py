@@ -168,8 +168,7 @@ class SmoothIntervals:
     """The intervals between breakpoints, one after the other.
 
     At a time at which a law jumps, either of its sides may be evaluated. A step therefore ends slightly before that
-    time
-    and the next one begins slightly after it, where the equations are evaluated again.
+    time and the next one begins slightly after it, where the equations are evaluated again.
 
     Parameters
     ----------

@@ -244,8 +244,7 @@ def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) 
     """Return a message on a quantity that diverges within a finite time; empty if there is none.
 
     It may be the law of a force or the state of a controller. Where there are no constraint rows, so that nothing can
-    lock,
-    it may also be a coordinate or a velocity.
+    lock, it may also be a coordinate or a velocity.
     """
     s, t = a.compiled.structure, float(clock.real.t)
     if not clock.real.h < NARROW_STEP * max(abs(t), clock.real.largest):
@@ -260,7 +259,8 @@ def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) 
         return ""
     i = first + int(np.argmax(part))
     return (
-        f"at t = {t:.6g} s {_component_in_words(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
+        f"at t = {t:.6g} s {_component_in_words(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a "
+        "second, faster and "
         f"faster: it has no value from there on. {_likely_cause(a, i)}"
     )
 

@@ -146,8 +146,7 @@ def in_suitable_coordinates(
     """Return the start in coordinates that suit implicit integrators.
 
     Joint coordinates of long chains have full matrices, and drivers prescribe some of them; such mechanisms use
-    absolute
-    coordinates.
+    absolute coordinates.
 
     Raises
     ------
@@ -344,7 +343,8 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
     given = [f"{name}={getattr(o, name)!r}" for name in _given_options(o)]
     if unknown := _unknown_to_impulse_stepping(model):
         raise ModelError(
-            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method out, or give "
+            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method "
+            "out, or give "
             f"method={DEFAULT_INTEGRATOR!r}"
         )
     if given:
@@ -352,7 +352,8 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
         raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
-            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
+            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave "
+            "coordinates out"
         )
     return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as asked")
 

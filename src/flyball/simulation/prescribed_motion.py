@@ -122,7 +122,9 @@ def cumulative_integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
 
 
 def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
-    """Return the fewest intervals whose removal halves the allowed error; none if the error is allowed."""
+    """Return the fewest intervals without whose errors at most half of the allowed error is left; none if it is
+    allowed.
+    """
     if error.sum() <= allowed:
         return np.zeros(0, np.int64)
     order = np.argsort(-error)
@@ -131,7 +133,7 @@ def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
 
 
 def _interval_integrals(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the integrals over every interval, (n - 1, accounts), and their differences from those with fewer nodes."""
+    """Return the integrals over every interval, (n - 1, accounts), and their change with fewer nodes."""
     if len(t) < 2:
         return np.zeros((0, P.shape[1])), np.zeros(0)
     best = _quadrature(t, P, min(NODES, len(t)))

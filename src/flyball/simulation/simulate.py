@@ -356,9 +356,7 @@ def run_clock(
             begin, clock.count.quota = time.perf_counter(), part.most(quota)
             before = clock.count.accepted + clock.count.rejected
             with deferred_interrupts(s.functions):
-                if (
-                    bound is None or c.system is not on[0] or c.scratch is not on[1]
-                ):  # generated code was taken or dropped
+                if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # changed code
                     bound, on = c.bound(method, clock, buffer), (c.system, c.scratch)
                 used = bound(task)
                 rows.append(buffer[:used].copy())

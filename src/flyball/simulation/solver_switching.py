@@ -76,10 +76,7 @@ SPENT = CostAccount()
 """Cost of the general engine."""
 
 
-EVALUATION_COST, COST_SHARE = (
-    150.0,
-    0.6,
-)  # fixed cost of an evaluation [ns], and factor of the estimated cost of the right-hand side
+EVALUATION_COST, COST_SHARE = 150.0, 0.6  # of an evaluation: fixed cost [ns], factor of the right-hand side's
 
 
 def mechanism_kind(s: Structure) -> tuple[str, float]:
@@ -475,8 +472,8 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
     """Return the largest eigenvalue [1/s] of the Jacobian of (q, v, x)' at the present state of a motion.
 
     x are states of controllers; modes are held fixed. Where steps are as wide as stability allows, their last two
-    stages
-    differ by the fast modes, so that a few products find the eigenvalue. The workspace of the motion is not changed.
+    stages differ by the fast modes, so that a few products find the eigenvalue. The workspace of the motion is not
+    changed.
 
     Parameters
     ----------
@@ -497,9 +494,7 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
 
     def product(x: np.ndarray) -> np.ndarray:
         way, out = x * unit, np.zeros(n)
-        for part in (
-            parts
-        ):  # one block at a time: with rates of 1e6/s and more, one block would be lost in the rounding of another
+        for part in parts:  # separately: with rates of 1e6/s one would be lost in the rounding of another
             most = np.max(np.abs(way[part]) / size[part], initial=0.0)
             if most > 0.0:
                 moved = y.copy()

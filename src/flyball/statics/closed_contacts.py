@@ -325,6 +325,7 @@ def support_forces(
     place : ContactState
     x : RestState
         State at rest at this position, of the model with active stops as constraints.
+    signs : mapping
         Name of a stop -> +1 if its effort may only be positive, -1 if only negative, 0 for both.
     bears : mapping, optional
         Name of a sticking element -> its friction capacity [N] or [N m].

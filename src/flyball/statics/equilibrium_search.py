@@ -309,7 +309,7 @@ STEADY_ITERATIONS = 60
 STEADY_LONGEST_STEP = 0.2  # longest step [rad, or relative to the mechanism's length or a speed]
 STEADY_TOLERANCE = 1e-9  # residual of an equation of motion relative to its forces
 STEADY_LAST_STEP = 1e-7  # Newton's last step
-STEADY_SINGULAR_VALUE = 1e-11  # singular values below this part of the largest are none
+STEADY_SINGULAR_VALUE = 1e-11  # singular values below this part of the largest count as zero
 
 
 @dataclass

@@ -181,7 +181,7 @@ class TimedAnalysis(RunAnalysis):
         return reduce_curve(r.how, found.t, found.curve(r.name)[1], times)
 
     def remarks(self, found: Any) -> Sequence[object]:
-        """Those of its health."""
+        """Remarks in the health of the result."""
         return found.health.remarks
 
 
@@ -192,7 +192,7 @@ class MotionAnalysis(TimedAnalysis):
     takes = (*(f for f in SimulateOptions.__dataclass_fields__ if f not in ("parameters", "progress")),)
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
-        """Those of the study, at its output times."""
+        """Options of the study, with its output times."""
         return SimulateOptions.asked({**known, "outputs": times, "progress": False})
 
     def run(self, model: Model, o: SimulateOptions) -> Any:
@@ -203,7 +203,7 @@ class MotionAnalysis(TimedAnalysis):
         return result
 
     def doubtful(self, found: Any) -> Sequence[str]:
-        """Those of its health."""
+        """Doubts in the health of the result."""
         return found.health.doubtful
 
 
@@ -214,28 +214,28 @@ class KinematicsAnalysis(TimedAnalysis):
     takes = ("t_start", "t_end", "outputs", "coordinates", "specialize")
 
     def refuse(self, model: Model) -> None:
-        """Refuse what only a motion knows."""
+        """Refuse elements whose state depends on a motion."""
         refuse_unsupported(model, self.title, KNOWN_SWITCHES)
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
-        """Those of the study, at its output times."""
+        """Options of the study, with its output times."""
         return KinematicsOptions.asked({**known, "times": times, "t_end": None, "progress": False})
 
     def run(self, model: Model, o: KinematicsOptions) -> Any:
-        """As drivers prescribe."""
+        """The motion prescribed by the drivers."""
         return kinematics(model, o)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionOptions(Options):
-    """What a function is asked: the values of the parameters."""
+    """Arguments of a user's function: the values of the parameters."""
 
     parameters: Mapping[str, float] | None
 
 
 @dataclass(frozen=True)
 class FunctionAnalysis(RunAnalysis):
-    """A function of the mechanism and the values of its parameters; curves are read of what has them at one time."""
+    """A user's function of the mechanism and parameter values; it may return anything that has curves at one time."""
 
     function: Callable[[Any, dict[str, float]], Any]
     title = "function"
@@ -245,18 +245,18 @@ class FunctionAnalysis(RunAnalysis):
         return FunctionOptions.asked(known)
 
     def run(self, model: Model, o: FunctionOptions) -> Any:
-        """What it returns."""
+        """The return value of the function."""
         return self.function(model, dict(o.parameters or {}))
 
     def named(self, model: Model, text: Any) -> StudyQuantity:
-        """Only functions know what it returns."""
+        """Refuse names: quantities of a user's function must be functions."""
         raise ModelError(
             f"of={text!r}: names say nothing of what a function of your own returns; give of={{'name': function of it}}"
         )
 
 
 def _function_value(r: StudyQuantity, found: Any) -> np.ndarray:
-    """What a user's function makes of an answer: one number."""
+    """Number that a user's function computes from a result."""
     y = np.asarray(r.function(found))  # type: ignore[misc]
     if y.ndim or y.dtype.kind not in "fiub":
         what = f"an array of {' x '.join(map(str, y.shape))}" if y.ndim else repr(y.item())
@@ -273,7 +273,7 @@ LINEAR_QUANTITIES = "gain(output, input), gain(output, input, omega), phase(outp
 
 
 def _curve_at_instant(model: Model, text: Any) -> StudyQuantity:
-    """A curve's value at the one instant that there is."""
+    """Value of a curve in a result with one time."""
     if isinstance(text, str) and (found := REDUCTION_NAME.fullmatch(text)):
         raise ModelError(f"of={text!r}: there is one instant only, at which {found[2].strip()} is one number")
     return StudyQuantity(text, VALUE, text, single_quantity(model, text).unit)
@@ -286,7 +286,7 @@ class InstantAnalysis(RunAnalysis):
     takes = ("t",)
 
     def refuse(self, model: Model) -> None:
-        """Refuse what holds at times: whether it does, a motion knows."""
+        """Refuse switching elements, whose state depends on a motion."""
         if parts := list(unsupported_elements(model)):
             raise ModelError(
                 f"{model.name!r} has {', '.join(e.title for e in parts)}, and analysis='instant' does not know what "
@@ -298,7 +298,7 @@ class InstantAnalysis(RunAnalysis):
         return AssembleOptions.asked({**known, "t": known["t"] or 0.0})
 
     def run(self, model: Model, o: AssembleOptions) -> Any:
-        """The state there, as a result with one time."""
+        """The state as a result with one time."""
         a = assemble(model, t=o.t, parameters=o.parameters)
         return snapshot(MechanismState.moving(a.compiled, a.t, a.q, a.v))
 
@@ -307,7 +307,7 @@ class InstantAnalysis(RunAnalysis):
         return _curve_at_instant(model, text)
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """Of the curve."""
+        """Value of the curve."""
         return np.array(found.curve(r.name)[1][0])
 
 
@@ -317,10 +317,10 @@ class EquilibriumAnalysis(InstantAnalysis):
     title = "equilibrium"
 
     def refuse(self, model: Model) -> None:
-        """What it does not know each run says."""
+        """Refuse nothing here: each run refuses what it does not support."""
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
-        """Where it rests, as drawn the guess of every run."""
+        """Options of the equilibrium; every run starts from the described position."""
         return rest_options(known["t"] or 0.0, known["parameters"])
 
     def run(self, model: Model, o: Any) -> Any:
@@ -336,20 +336,20 @@ class EquilibriumAnalysis(InstantAnalysis):
         )
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """Of a curve, or of the equilibrium."""
+        """Value of a curve, or a number of the equilibrium."""
         if r.name == IS_STABLE:
             return np.array(np.nan if found.stability == NOT_JUDGED else float(found.stability == STABLE))
         return np.array(found.least if r.name == LEAST_STIFFNESS else found[r.name])
 
     def remarks(self, found: Any) -> Sequence[object]:
-        """What makes the answer less than it seems."""
+        """Notes of the equilibrium, and missing stability."""
         own = [] if found.stability == STABLE else [f"the equilibrium is {found.stability}"]
         return [*own, *found.kinks, *found.notes]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SmallMotionOptions(Options):
-    """Where small motions are asked of: as drawn at ``t``, or about the equilibrium."""
+    """Operating point of small motions: as described at ``t``, or the equilibrium."""
 
     t: float
     parameters: Mapping[str, float] | None
@@ -363,7 +363,7 @@ class SmallMotionOptions(Options):
             raise ModelError(f"about must be 'equilibrium' or nothing, got {self.about!r}")
 
     def there(self, model: Model) -> dict[str, Any]:
-        """Where, for the analysis of it."""
+        """Operating point as options of the single analysis."""
         told: dict[str, Any] = {"parameters": self.parameters, "coordinates": "auto", "frozen": False}
         if self.about is None:
             return told | {"about": None, "t": self.t}
@@ -371,12 +371,12 @@ class SmallMotionOptions(Options):
 
 
 class SmallMotionAnalysis(RunAnalysis):
-    """Small motions about a place."""
+    """Small motions about an operating point."""
 
     takes = ("t", "about")
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
-        """Where, and from what to what."""
+        """Operating point, inputs and outputs."""
         out, into = (
             tuple(dict.fromkeys(r.of[k] for r in quantities if r.how == VALUE and len(r.of) == 3)) for k in (0, 1)
         )
@@ -384,7 +384,7 @@ class SmallMotionAnalysis(RunAnalysis):
         return SmallMotionOptions(t=t, parameters=parameters, about=about, inputs=into, outputs=out)
 
     def remarks(self, found: Any) -> Sequence[object]:
-        """Its notes."""
+        """Notes of the result."""
         return found.notes
 
 
@@ -394,7 +394,7 @@ class ModesAnalysis(SmallMotionAnalysis):
     title = "modes"
 
     def refuse(self, model: Model) -> None:
-        """Refuse sampled controllers, which `linearize` knows."""
+        """Refuse sampled controllers, which only `linearize` supports."""
         refuse_sampled_controllers(model, "modes")
 
     def run(self, model: Model, o: SmallMotionOptions) -> Any:
@@ -410,7 +410,7 @@ class ModesAnalysis(SmallMotionAnalysis):
         return StudyQuantity(text, VALUE, found[1], MODE_UNITS[found[1]], None, (int(found[2]),))
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """Of a mode; nan of one that there is not."""
+        """Number of a mode; NaN if the mode does not exist."""
         if r.name == IS_STABLE:
             return np.array(float(found.stable))
         numbers, k = getattr(found, r.name), r.of[0]
@@ -418,12 +418,12 @@ class ModesAnalysis(SmallMotionAnalysis):
 
 
 class LinearAnalysis(SmallMotionAnalysis):
-    """`Mechanism.linearize`: eigenvalues, and what outputs answer to inputs."""
+    """`Mechanism.linearize`: eigenvalues, and responses of outputs to inputs."""
 
     title = "linearize"
 
     def run(self, model: Model, o: SmallMotionOptions) -> LinearModel:
-        """The linear model, with the inputs and outputs that are asked for."""
+        """The linear model with the requested inputs and outputs."""
         return linearize(model, LinearizeOptions(inputs=o.inputs, outputs=o.outputs, **o.there(model)))
 
     def named(self, model: Model, text: Any) -> StudyQuantity:
@@ -444,7 +444,7 @@ class LinearAnalysis(SmallMotionAnalysis):
         return StudyQuantity(text, VALUE, how, unit, None, (parts[0], parts[1], at))
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """Of the frequency response, at frequency 0 with its sign; or of the eigenvalues."""
+        """Number of the frequency response (with sign at frequency 0), or of the eigenvalues."""
         if r.name == ABSCISSA:
             return _spectral_abscissa(found)
         out, into, at = r.of
@@ -453,11 +453,11 @@ class LinearAnalysis(SmallMotionAnalysis):
 
 
 def _spectral_abscissa(found: LinearModel) -> np.ndarray:
-    """The fastest growth [1/s]: of multipliers from one instant to the next that of s in z = exp(s period)."""
+    """Largest growth rate [1/s]; with sampled controllers that of s in z = exp(s period)."""
     w = found.eigenvalues
     if not len(w):
         return np.array(np.nan)
     if found.period is None:
         return np.array(w.real.max())
-    with np.errstate(divide="ignore"):  # what is gone after one period
+    with np.errstate(divide="ignore"):  # a multiplier of 0 decays within one period
         return np.array(np.log(np.abs(w)).max() / found.period)

@@ -482,7 +482,7 @@ def _option_values(o: Any) -> dict[str, Any]:
 
 
 def _compute_missing(question: RunSpecification, found: Study, o: StudyOptions, report_progress: Any) -> None:
-    """Compute what is still to be done; an interrupt leaves what was done by then.
+    """Compute the missing runs; an interrupt keeps the results so far.
 
     Raises
     ------

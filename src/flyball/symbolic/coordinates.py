@@ -1,8 +1,8 @@
 """The choice of coordinates for symbolic equations, and the initial state in them.
 
-The rule is that of a simulation. Whether inertia acts along every coordinate and whether friction knows its
-reactions is decided by the traced equations in the reference configuration; the compiled engine is asked only if
-the answer is no.
+The rule is that of a simulation. The traced equations in the reference configuration show whether inertia acts along
+every coordinate and whether the reactions that friction needs are determined. The compiled engine is used only if they
+are not.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_
 from ..tables.coordinate_choice import spanning_joints
 
 RANK_TOLERANCE = (
-    1e-6  # of the largest singular value of the constraints' Jacobian, above which rows surely are independent
+    1e-6  # rows of the Jacobian are independent if the smallest singular value exceeds this part of the largest
 )
 
 
 class CoordinateChoice(NamedTuple):
-    """Coordinates of equations: names of the tree joints, and which they are and why."""
+    """Coordinates of equations: names of the tree joints, and a description with the reason of the choice."""
 
     tree: tuple[str, ...]
     why: str
 
 
 def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wish: str) -> CoordinateChoice:
-    """Coordinates as wished; ``auto``: those of joints, wherever friction allows it.
+    """Choose coordinates: as requested by ``wish``, or for ``auto`` joint coordinates unless friction prevents it.
 
     Raises
     ------
     ModelError
-        For an unknown wish, or if a body can move without inertia.
+        If ``wish`` is unknown, or if a body can move without inertia.
     AnalysisError
-        If friction follows reactions that redundancy leaves undetermined, for joint coordinates.
+        If, in joint coordinates, friction depends on undetermined reactions of redundant constraints.
     """
     refuse_unknown_coordinates(wish)
     tree = spanning_joints(model) if wish != "absolute" else ()
@@ -64,7 +64,7 @@ def _description(model: Model, wish: str, tree: Sequence[str]) -> str:
 
 
 def _is_regular(c: CompiledMechanism, wish: str) -> bool:
-    """Whether, as drawn, inertia moves along all velocities and rows leave no reaction open that a friction follows."""
+    """Whether, in the reference configuration, all velocities have inertia and friction has determined reactions."""
     s, S = c.structure, c.values.system
     light, loaded = S.scales.semidefinite != 0.0, bool(s.loads) and wish != "absolute"
     if not light and not loaded:
@@ -78,7 +78,8 @@ def _is_regular(c: CompiledMechanism, wish: str) -> bool:
     if not light:
         return True
     M = np.asarray(evaluate_array(T.M, at), float) * sizes * sizes[:, None]
-    if not s.tree:  # joints' coordinates must have inertia of their own, bodies only where the rows let them go
+    # Joint coordinates need their own inertia; bodies only along the motions that the rows allow.
+    if not s.tree:
         Z = _null_space_of_rows(G)
         M = Z.T @ M @ Z
     return not len(M) or bool(np.linalg.eigvalsh(M)[0] > THIN_INERTIA * S.bodies.mass.sum() * c.values.length**2)
@@ -94,7 +95,7 @@ def _independent(G: np.ndarray) -> bool:
 
 
 def _null_space_of_rows(G: np.ndarray) -> np.ndarray:
-    """What the rows leave free, (nv, freedoms)."""
+    """Basis of the motions that the rows allow, (nv, freedoms)."""
     if not len(G):
         return np.eye(G.shape[1])
     _, w, V = np.linalg.svd(G)
@@ -102,10 +103,10 @@ def _null_space_of_rows(G: np.ndarray) -> np.ndarray:
 
 
 def _engine_choice(model: Model, parameters: Mapping[str, float] | None, wish: str) -> CoordinateChoice:
-    """The choice that a motion makes."""
+    """The choice that a simulation makes."""
     try:
         start = find_initial_state(model, 0.0, parameters, None, "joint" if wish == "auto" else wish)
-    except AnalysisError as error:  # friction that follows loads which joint coordinates do not know
+    except AnalysisError as error:  # friction that depends on loads missing in joint coordinates
         if wish != "auto":
             raise
         return CoordinateChoice((), f"absolute: {str(error).partition(': ')[2]}")
@@ -114,7 +115,7 @@ def _engine_choice(model: Model, parameters: Mapping[str, float] | None, wish: s
 
 
 def initial_assembly(model: Model, parameters: Mapping[str, float] | None, tree: tuple[str, ...]) -> Assembly:
-    """Where the mechanism starts, as described and assembled, in coordinates that are chosen.
+    """Initial state as described and assembled, in given coordinates.
 
     Raises
     ------

@@ -1,8 +1,7 @@
 """The equations of motion of a mechanism as expressions: what `Mechanism.symbolic` returns.
 
-`Equations` is composed of the symbols and matrices, the display as text, LaTeX and HTML, and the way to linear
-equations. Quantities of results, such as reactions and energies, come from the formulas of `results` evaluated on
-symbols.
+`Equations` combines the symbols and matrices, the display as text, LaTeX and HTML, and the linearisation. Quantities of
+results, such as reactions and energies, come from the formulas of `results` evaluated on symbols.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SymbolicOptions(Options):
-    """What `Mechanism.symbolic` is asked."""
+    """Arguments of `Mechanism.symbolic`."""
 
     coordinates: str
     inputs: tuple[str, ...]
@@ -73,11 +72,11 @@ class EquationSymbols(SymbolTable):
         self, model: Model, chosen: CoordinateChoice, o: SymbolicOptions, parameter_values: Mapping[str, Symbol]
     ) -> None:
         self.model, self._asked = model, o
-        self.tree, self.coordinates = chosen  # names of the tree joints; which coordinates these are, and why
-        self.described = model  # before its inputs and numbers were symbols
+        self.tree, self.coordinates = chosen  # names of the tree joints; description of the coordinates
+        self.described = model  # before inputs and numbers became symbols
         self.graph = Graph()
         s = structure(model, Choices(tree=self.tree, coupled=bool(self.tree)))
-        self._told = parameter_values  # symbols of parameters that go by other names: inputs, numbers of fields
+        self._told = parameter_values  # symbols of parameters with other names: inputs, numbers of fields
         self._given = self._parameters(o)
         given: Any = self._given
         x = values(s, given or None)
@@ -91,7 +90,7 @@ class EquationSymbols(SymbolTable):
         return repr(self.model.name)
 
     def _parameters(self, o: SymbolicOptions) -> dict[str, Node]:
-        """Symbols of the parameters that have values of their own; the others are expressions of these."""
+        """Symbols of the parameters that have their own value; the others are expressions of these."""
         values = self.model.environment(o.parameters)
         out = {}
         for name, value in self.model.parameters.items():
@@ -121,7 +120,7 @@ class EquationSymbols(SymbolTable):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs, in the order asked for; their symbols are 0 unless they are given."""
+        """Names of the inputs, in the requested order; their symbols are 0 unless they are given."""
         return self._asked.inputs
 
     def expression(self, name: str) -> Expressions:
@@ -161,22 +160,22 @@ class EquationSymbols(SymbolTable):
 
     @property
     def loads(self) -> Expressions:
-        """What presses together the surfaces of each joint with friction [N]."""
+        """Normal loads of joints with friction [N], as symbols."""
         return self._symbols(self.named_equations.traced.loads)
 
     @property
     def load_values(self) -> Expressions:
-        """What the loads are, from the multipliers: loads = load_values closes the equations."""
+        """The loads as functions of the multipliers: loads = load_values closes the equations."""
         return Expressions(self, self.named_equations.traced.returned, self.loads.rows, unit="N")
 
     @property
     def places(self) -> dict[str, CurveParameter]:
-        """Places of followers on curves, by name: symbol, what is zero there, rate."""
+        """Curve parameters of followers, by name: symbol, equation, rate."""
         return {p.symbol.data.name: p for p in self.named_equations.places}
 
     @property
     def T(self) -> Expressions:
-        """Qdot = T v, (nq, nv)."""
+        """Matrix T of qdot = T v, (nq, nv)."""
         return Expressions(self, self.named_equations.traced.T, self.q.rows, self.v.rows)
 
     @property
@@ -191,7 +190,7 @@ class EquationSymbols(SymbolTable):
 
     @property
     def g(self) -> Expressions:
-        """Constraints, (nr,): zero where they are closed, and of rows that restrain velocities only."""
+        """Constraint residuals, (nr,): zero where closed; zero for rows on velocities only."""
         return Expressions(self, self.named_equations.traced.g, self.lam.rows)
 
     @property
@@ -218,12 +217,12 @@ class EquationSymbols(SymbolTable):
 
     @cached_property
     def assembly(self) -> Assembly:
-        """Where the mechanism starts, in these coordinates."""
+        """Initial state in these coordinates."""
         return initial_assembly(self.model, self._asked.parameters, self.tree)
 
     @cached_property
     def start(self) -> dict[str, float]:
-        """Time and state as described and assembled, by the names of the symbols: found by the engine when asked for.
+        """Time and state as described and assembled, by symbol names; computed by the engine on first use.
 
         Raises
         ------
@@ -234,7 +233,7 @@ class EquationSymbols(SymbolTable):
         return self.state(a.t, a.q, a.v)
 
     def state(self, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
-        """The engine's arrays by the names of the symbols, as `Prepared` has them; times come last in arrays.
+        """Arrays of the engine as values by symbol names; arrays over time have the time last.
 
         Parameters
         ----------
@@ -245,7 +244,7 @@ class EquationSymbols(SymbolTable):
         return state_by_symbol(self.named_equations, t, q, v)
 
     def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, Any]:
-        """Values of symbols, refused by name where wrong or missing; places on curves are found."""
+        """Check values of symbols by name, and find the curve parameters."""
         known = dict(values)
         names = {p.symbol.data.name: p for p in self.named_equations.places}
         if missing := [p for k, p in names.items() if k in requested and k not in known]:
@@ -258,7 +257,7 @@ class EquationSymbols(SymbolTable):
 
 
 class Quantities:
-    """A motion at one instant, of symbols."""
+    """A motion at one time, of symbols."""
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
@@ -279,7 +278,7 @@ class Quantities:
         if what == "power" and (found := self._power(owner)) is not None:
             return found
         try:
-            with np.errstate(invalid="ignore"):  # formulas say nan where something has no value, and mean it
+            with np.errstate(invalid="ignore"):  # formulas return NaN where something has no value
                 unit, values = self.result.channel(f"{owner}.{what}")
         except UndeterminedDecision as error:
             raise AnalysisError(f"{name!r} has no expression: {error}") from error
@@ -287,7 +286,7 @@ class Quantities:
 
     def reaction(self, joint: str, axes: str, on: str | None) -> tuple[Expressions, Expressions]:
         """Force and torque of a joint."""
-        with np.errstate(invalid="ignore"):  # formulas say nan where something has no value, and mean it
+        with np.errstate(invalid="ignore"):  # formulas return NaN where something has no value
             force, torque = self.result[joint].reaction(axes=axes, on=on)
         return self._of(force, "N"), self._of(torque, "N*m")
 
@@ -303,7 +302,7 @@ class Quantities:
             raise ModelError("'energy.balance' compares with the start of a motion; it is no function of the state")
 
     def _quaternion(self, owner: str) -> Expressions:
-        """Of a body that hangs freely: its coordinates."""
+        """Quaternion of a free body: its coordinates."""
         x = self.equations.named_equations
         b = x.values.structure.place.get(owner, -1)
         S = x.values.system
@@ -315,7 +314,7 @@ class Quantities:
         return Expressions(self.equations, object_vector(e), [n.data.name for n in e], unit="1")
 
     def _power(self, owner: str) -> Expressions | None:
-        """Of a driver: its effort times the rate that it asks for."""
+        """Power of a driver: its effort times the prescribed rate."""
         x = self.equations.named_equations
         s, T = x.values.structure, x.traced
         if owner not in {d.name for d in s.model.drivers}:
@@ -325,21 +324,21 @@ class Quantities:
 
 
 def _row(x: list[Any]) -> np.ndarray:
-    """One instant, an array (1, n) of objects."""
+    """Array (1, n) of objects for one time."""
     out = np.empty((1, len(x)), object)
     out[0, :] = x
     return out
 
 
-READABLE, WRITABLE = 1e7, 1e13  # symbols, written out: those of chains of 8 and of 22 links in joint coordinates
+READABLE, WRITABLE = 1e7, 1e13  # written-out symbols of chains of 8 and of 22 links in joint coordinates
 
 
 class EquationDisplay:
-    """What every set of equations of motion does to be read."""
+    """Display of equations of motion as text, LaTeX and HTML."""
 
     @cached_property
     def document(self) -> Document:
-        """Everything about the equations, short and in order: see `text`, `to_html` and `to_latex`.
+        """Document with all equations in short form: see `text`, `to_html` and `to_latex`.
 
         Raises
         ------
@@ -352,7 +351,7 @@ class EquationDisplay:
 
     @cached_property
     def _written_out(self) -> int:
-        """Symbols of the equations if nothing that recurs had a name."""
+        """Number of symbols of the equations without names for common subexpressions."""
         eq = cast("Equations", self)
         return expanded_symbol_count(x for k in ("M", "f", "g", "G", "gamma") for x in getattr(eq, k).nodes.ravel())
 
@@ -364,11 +363,11 @@ class EquationDisplay:
         )
 
     def text(self) -> str:
-        """All of it as plain text: symbols, constraints, mass matrix, forces, equations of motion, energies."""
+        """The document as plain text: symbols, constraints, mass matrix, forces, equations of motion, energies."""
         return text_document(self.document)
 
     def latex(self) -> str:
-        """All of it as a LaTeX file of its own, for ``pdflatex``."""
+        """The document as a complete LaTeX file, for ``pdflatex``."""
         return latex_document(self.document)
 
     def to_latex(self, path: str | os.PathLike) -> None:
@@ -382,7 +381,7 @@ class EquationDisplay:
         write_file(path, self.latex(), LATEX)
 
     def html(self) -> str:
-        """All of it as one page that needs no network: browsers draw its formulas (MathML) by themselves."""
+        """The document as one HTML page that needs no network: browsers draw its formulas (MathML) themselves."""
         from ..view.equations_page import equations_page
 
         return equations_page(self.document)
@@ -451,24 +450,24 @@ class Linearization:
     ) -> LinearEquations:
         """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the parameters.
 
-        They are made of the constrained equations by derivatives at the point, reactions that turn with the bodies
-        included; transfer functions and conditions of stability follow from them. The inputs u are those of
-        `Mechanism.symbolic`. The point is an equilibrium, or a motion in which coordinates of joints turn evenly while
-        all others stand still.
+        They follow from the constrained equations by derivatives at the point, including reactions that turn with the
+        bodies; transfer functions and conditions of stability follow from them. The inputs u are those of
+        `Mechanism.symbolic`. The point is an equilibrium, or a motion in which joint coordinates turn at constant rates
+        while all others are constant.
 
         Parameters
         ----------
         outputs : sequence of str
-            Anything that a result has: coordinates, sensors, reactions such as ``"A.fx"``, energies.
+            Quantities of results: coordinates, sensors, reactions such as ``"A.fx"``, energies.
         at : Equilibrium, Result or mapping, optional
-            Where. As drawn, if not given: then the point has the parameters by which the mechanism is drawn. A mapping
-            gives coordinates, and as ``"A.angle rate"`` or ``"A.angle'"`` their rates: numbers, texts with a unit,
-            expressions of the mechanism's parameters; what it does not give is as drawn, or moved so that loops close.
-            Of an equilibrium, or the end of a motion, the coordinates are numbers.
+            Operating point. By default the reference configuration, with the parameters as symbols. A mapping gives
+            coordinates, and as ``"A.angle rate"`` or ``"A.angle'"`` their rates: numbers, texts with a unit,
+            expressions of the mechanism's parameters. Coordinates that are not given keep their reference values, or
+            are moved to close loops. At an equilibrium, or the end of a motion, the coordinates are numbers.
         independent : sequence of str
-            Coordinates that the states are changes of; chosen by pivoting if not given.
+            Coordinates whose changes are the states; chosen by pivoting if not given.
         balanced_by : sequence of str
-            Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+            Parameters that are solved for so that the point is an equilibrium, as many as there are conditions.
 
         Raises
         ------
@@ -500,7 +499,7 @@ class Linearization:
 
 
 def _rate(name: Any) -> Any:
-    """``"A.angle rate"``, as states are called, for the symbol ``"A.angle'"``."""
+    """Convert ``"A.angle rate"``, the name of a state, to the symbol ``"A.angle'"``."""
     return f"{name[:-1]} rate" if isinstance(name, str) and name.endswith("'") else name
 
 
@@ -509,49 +508,48 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
 
-    Symbols are called as in results: ``"A.angle"``, its rate ``"A.angle'"``, parameters by their names. Everything is
-    an `Expressions`: ``eq.M[0, 0]``, ``eq.f.sympy()``, ``eq.g.at({"A.angle": 0.3})``. Whatever a result has can be
-    asked for by its name: ``eq["slider.x"]``, ``eq["A.force"]``, ``eq["energy.kinetic"]``, ``eq["spring.power"]``.
+    Symbols have the names used in results: ``"A.angle"``, its rate ``"A.angle'"``, parameters by their names. All are
+    `Expressions`: ``eq.M[0, 0]``, ``eq.f.sympy()``, ``eq.g.at({"A.angle": 0.3})``. Every quantity of a result is
+    available by its name: ``eq["slider.x"]``, ``eq["A.force"]``, ``eq["energy.kinetic"]``, ``eq["spring.power"]``.
 
     Attributes
     ----------
     model : Mechanism
     coordinates : str
-        Which they are, and why.
+        Description of the coordinates, with the reason of the choice.
     q, v, vdot : Expressions
         The symbols of coordinates, velocities and accelerations. A body that is free in space has the Euler parameters
         ``e0`` to ``e3`` in q, and in v the angular velocity ``w_x``, ``w_y``, ``w_z`` along its own axes.
     lam : Expressions
         The symbols of the multipliers, one for each row of g; of a driver or a coupling its effort.
     loads : Expressions
-        What presses the surfaces of joints with friction together: symbols in f. What they are when multipliers are
-        known is ``load_values``.
+        Normal loads of joints with friction: symbols in f. ``load_values`` gives them as functions of the
+        multipliers.
     T, M, f, g, nu, G, gamma : Expressions
-        f has all forces but reactions, gyroscopic terms included. Rows of drivers are rows as all others.
+        f contains all forces except reactions, with gyroscopic terms. Drivers have constraint rows like joints.
     """
 
-    # -- what results have
+    # -- quantities of results
 
     @cached_property
     def quantities(self) -> Quantities:
-        """A motion at one instant, of expressions."""
+        """Quantities of a motion at one time, as expressions."""
         return Quantities(self)
 
     def __getitem__(self, name: str) -> Expressions:
-        """Anything that a result has, by its name, or a symbol.
+        """A quantity of a result by its name, or a symbol.
 
-        Quantities of joints and drivers are in the multipliers, of joints whose coordinates the equations are in, in
-        the accelerations too.
+        Quantities of joints and drivers contain the multipliers. Those of tree joints contain the accelerations, too.
 
         Raises
         ------
         ModelError
-            If there is nothing of that name, or it is no function of the state: works, energy balances.
+            If the name is unknown, or the quantity is no function of the state: works, energy balances.
         """
         return self.expression(name) if name in self.named else self.quantities.quantity(name)
 
     def reaction(self, joint: str, *, axes: str = "world", on: str | None = None) -> tuple[Expressions, Expressions]:
-        """Force [N] and torque [N m] of a joint, as `JointView.reaction`: in lam, and in vdot for tree joints.
+        """Force [N] and torque [N m] of a joint, as `JointView.reaction`, in terms of lam (and vdot for tree joints).
 
         Parameters
         ----------
@@ -559,7 +557,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         axes : str
             ``"world"``, ``"joint"``, or the name of one of the two bodies.
         on : str, optional
-            The body on which it acts; the second one if not given. The torque is about the joint's point on that.
+            The body on which it acts; by default the second one. The torque is about the joint's point on that body.
         """
         return self.quantities.reaction(joint, axes, on)
 
@@ -574,14 +572,14 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
             Coordinates such as ``"A.angle"``, as many as there are freedoms; chosen by pivoting at the start if not
             given.
         closed : bool
-            Whether to refuse mechanisms whose loops have no closed form; else what has none is an implicit function.
+            Whether to refuse mechanisms whose loops have no closed form; else these coordinates are implicit functions.
 
         Raises
         ------
         ModelError
             If a name does not exist, or the coordinates named depend on one another, are too many or too few.
         SingularityError
-            If the mechanism is drawn in a singular position.
+            If the reference configuration is a singular position.
         """
         from .explicit.explicit_equations import explicit_equations
 
@@ -595,7 +593,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         Parameters
         ----------
         outputs : sequence of str
-            Anything that a result has: coordinates, sensors, reactions such as ``"A.fx"``, energies.
+            Quantities of results: coordinates, sensors, reactions such as ``"A.fx"``, energies.
         independent, closed
             As for `explicit`.
 
@@ -604,20 +602,20 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         ModelError
             As for `explicit`; if an output does not exist or is not determined.
         SingularityError
-            If the mechanism is drawn in a singular position.
+            If the reference configuration is a singular position.
         """
         from .explicit.state_space import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
 
     def joint(self, name: str, *, orientation: str = "quaternion") -> JointEquations:
-        """A joint's own equations between two free frames, with the building blocks that they come from.
+        """Equations of one joint between two free frames, with the building blocks that they come from.
 
         Parameters
         ----------
         name : str
         orientation : {"quaternion", "bryant"}
-            How the symbols say in which way the frames are turned.
+            Symbols for the orientation of the frames.
         """
         from .joint_equations import joint_equations
 

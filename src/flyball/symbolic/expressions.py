@@ -1,4 +1,4 @@
-"""Expressions of a mechanism, a scalar, vector or matrix: displayed, differentiated, evaluated.
+"""Expressions of a mechanism (scalar, vector or matrix): display, derivatives and values.
 
 `SymbolTable` gives an expression its symbols by name.
 """
@@ -24,18 +24,18 @@ from ..expression_graph.simplification.simplify import simplified
 from ..model.messages import listing, suggest
 
 MAX_LETTERS = 6000  # that are printed
-LINE_WIDTH = 100  # letters of a line
-MAX_OPERATIONS = 4000  # operations from which on nothing is tried
+LINE_WIDTH = 100  # characters per line
+MAX_OPERATIONS = 4000  # from so many operations on nothing is simplified
 TOO_LONG = "too long to read: {} operations; .at(values) evaluates it, and export() of the equations writes code"
 
 
 def node_count(nodes: Sequence[Any]) -> int:
-    """Operations, each once."""
+    """Number of operations, each counted once."""
     return sum(bool(x.args) for x in nodes_in_order(nodes))
 
 
 def formula_lines(rows: Sequence[tuple[str, Any]], units: Sequence[Sequence[Node]] = ()) -> list[str]:
-    """Lines ``name = formula``, and what stands for what under ``where``; none if they are too long to be read."""
+    """Lines ``name = formula``, with definitions under ``where``; none if they are too long to be read."""
     if node_count([x for _, x in rows]) > MAX_OPERATIONS:
         return []
     rest, definitions = simplified_with_symbols([x for _, x in rows], units)
@@ -53,13 +53,13 @@ def _broken(line: str) -> list[str]:
 
 
 class SymbolTable:
-    """Symbols by name, and what is made of expressions of them."""
+    """Symbols by name, with printing and evaluation of expressions in them."""
 
     graph: Graph
 
     @property
     def title(self) -> str:
-        """Whose expressions they are, for messages."""
+        """Owner of the expressions, for messages."""
         raise NotImplementedError
 
     @property
@@ -74,7 +74,7 @@ class SymbolTable:
 
     @cached_property
     def printer(self) -> SympyPrinter:
-        """The one that makes SymPy expressions; it knows which node a SymPy symbol stands for."""
+        """Printer of SymPy expressions; it maps SymPy symbols back to nodes."""
         return SympyPrinter()
 
     def symbol(self, x: Any) -> Node:
@@ -83,7 +83,7 @@ class SymbolTable:
         Raises
         ------
         ModelError
-            If there is none of that name.
+            If the name is unknown.
         """
         x = getattr(x, "nodes", x)
         x = x[()] if getattr(x, "shape", None) == () else x
@@ -95,7 +95,7 @@ class SymbolTable:
         return named[x]
 
     def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, Any]:
-        """Values of symbols, refused by name where wrong or missing."""
+        """Check values of symbols; wrong or missing ones are refused by name."""
         named = self.named
         for name in values:
             if name not in named:
@@ -107,21 +107,21 @@ class SymbolTable:
 
 
 MAX_READ = 400  # operations up to which expressions are simplified to be shown
-MAX_WIDTH = 160  # letters of a line up to which a matrix is printed as such
+MAX_WIDTH = 160  # characters of a line up to which a matrix is printed as a matrix
 
 
 class Expressions:
     """One expression, a vector or a matrix of a mechanism's equations.
 
-    Sums, products (``*`` by element, ``@`` of matrices) and indices give further ones; each knows the symbols by the
-    names of `Equations`.
+    Sums, products (``*`` by element, ``@`` of matrices) and indices give further ones, with the same symbol names as
+    in `Equations`.
 
     Attributes
     ----------
     nodes : ndarray of object
         The nodes of the expression graph, or numbers; of shape () for one expression.
     rows, columns : tuple of str
-        What the entries belong to, by name, where that is known.
+        Names of rows and columns, where known.
     unit : str
     """
 
@@ -145,17 +145,17 @@ class Expressions:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Its sizes; () for one expression."""
+        """Shape; () for one expression."""
         return self.nodes.shape
 
     @property
     def symbols(self) -> dict[str, Node]:
-        """The symbols in it, by name, in the order in which they were made."""
+        """Symbols in the expressions, by name, in order of creation."""
         return {x.data.name: x for x in nodes_in_order(self.list()) if x.op == SYMBOL}
 
     @property
     def operations(self) -> int:
-        """Operations that evaluate it, each counted once."""
+        """Number of operations to evaluate it, each counted once."""
         return node_count(self.list())
 
     def list(self) -> list[Any]:
@@ -170,13 +170,13 @@ class Expressions:
         Parameters
         ----------
         values : mapping
-            Symbol's name -> number, complex number or array. Parameters left out have their own value, inputs are 0,
-            and followers are at their places on curves.
+            Symbol's name -> number, complex number or array. By default parameters have their own value, inputs are 0,
+            and curve parameters of followers are computed.
 
         Returns
         -------
         ndarray
-            Of the same shape; with arrays given, times come first.
+            The same shape; if arrays are given, the time axis comes first.
 
         Raises
         ------
@@ -193,7 +193,7 @@ class Expressions:
             raise TypeError(f"{self!r} is no single number")
         return float(self.at({}))
 
-    # -- others' forms
+    # -- other forms
 
     def sympy(self) -> Any:
         """As SymPy expression, or ``Matrix``, simplified if it is not too long; symbols have the mechanism's names.
@@ -208,13 +208,13 @@ class Expressions:
         return printer(shown if self.shape else shown[()])
 
     def simplified(self) -> Expressions:
-        """The same in a form that is shorter to read, as far as that is found quickly; equal in value."""
+        """An equal expression in a form that is shorter to read, as far as quickly found."""
         made = simplified(self.nodes.reshape(-1), units=self.symbol_table.units)
         return Expressions(self.symbol_table, made.reshape(self.shape), self.rows, self.columns, self.unit)
 
     @cached_property
     def _read(self) -> Expressions:
-        """What is shown: simplified if it is short enough to be read, sines of arctangents as algebra."""
+        """Expressions as displayed: simplified if short enough to be read, sines of arctangents as algebra."""
         if self.operations > MAX_OPERATIONS or not self.nodes.size:
             return self
         plain = self.simplified() if self.operations <= MAX_READ else self
@@ -231,11 +231,11 @@ class Expressions:
 
     @property
     def readable(self) -> Sequence[Any]:
-        """Entries as they are shown."""
+        """Entries as displayed."""
         return self._read.list()
 
     def texts(self) -> Any:
-        """As text, simplified if it is short enough to be read: lists of lists as deep as it has dimensions."""
+        """As text, simplified if short enough; nested lists with one level per dimension."""
         return np.vectorize(text.text, otypes=[object])(self._read.nodes).tolist() if self.nodes.size else []
 
     def latex(self) -> str:
@@ -275,7 +275,7 @@ class Expressions:
 
     @cached_property
     def _parted(self) -> str:
-        """Entry by entry, what recurs by a name."""
+        """Entry by entry, with names for common subexpressions."""
         labels = [", ".join(x) for x in itertools.product(*self._names())]
         rows = [(a, x) for a, x in zip(labels, self.readable, strict=True) if x != 0.0]
         return "\n".join(formula_lines(rows, self.symbol_table.units)) or self._refused
@@ -297,7 +297,7 @@ class Expressions:
         Raises
         ------
         ModelError
-            If there is no such symbol, or a Python function whose derivative is not known stands in the way.
+            If there is no such symbol, or a Python function has no known derivative.
         """
         return self._new(self._derived([by])[..., 0], self.rows, self.columns)
 
@@ -318,7 +318,7 @@ class Expressions:
             raise ModelError(f"{error}; give the law as a text, or its values as a table") from None
 
     def replaced(self, values: Mapping[str, Any]) -> Expressions:
-        """With numbers or other expressions in place of symbols."""
+        """Replace symbols by numbers or other expressions."""
         home = self.symbol_table
         new = [(home.symbol(name), _node(x)) for name, x in values.items()]
         out = np.empty(self.shape, object)
@@ -393,7 +393,7 @@ def _node(x: Any) -> Any:
 
 
 def _remaining_labels(x: Expressions, at: tuple[Any, ...]) -> list[tuple[str, ...]]:
-    """Names of what is left of rows and columns."""
+    """Names of the remaining rows and columns."""
     out = []
     for n, names in enumerate((x.rows, x.columns)):
         if n >= len(at):

@@ -35,13 +35,13 @@ class VectorForm(NamedTuple):
     Attributes
     ----------
     text : str
-        Its left side, which is zero.
+        Its left-hand side, which is zero.
     hahn : str
-        The same in Hahn's order of indices; r_P0 is the way from O to P along the axes of 0, A_0P turns from P to 0.
+        The same in Hahn's index order; r_P0 is the vector from O to P in the axes of 0, A_0P rotates from P to 0.
     block : str
-        Hahn's building block that it belongs to.
+        Hahn's building block.
     of_velocity : bool
-        Whether it restrains velocities only.
+        Whether it constrains velocities only.
     """
 
     text: str
@@ -64,7 +64,7 @@ VECTORS = {
     ),
     relative_spin.KIND: VectorForm("n_M @ (w_M - w_F)", "(A^{RM} n^M)^T (w_M - w_F) = 0", "", True),
 }
-"""Kind of row -> its vector form; angles, curves and wheels, which are not here, have none that is short."""
+"""Kind of row -> vector form; the rows of angles, curves and wheels have no short one."""
 
 
 AXES = "xyz"
@@ -72,7 +72,7 @@ ORIENTATIONS = ("quaternion", "bryant")
 
 
 class RowTerm(NamedTuple):
-    """A term of a row: kind and parameters of its formula, what it counts, how its frames are turned before."""
+    """A term of a row: kind and parameters of its formula, weight, rotations of its frames."""
 
     kind: Kind
     par: tuple
@@ -87,12 +87,12 @@ class JointEquations(SymbolTable):
     Attributes
     ----------
     position, velocity, acceleration : Expressions
-        Left sides of the rows, which are zero; rows that restrain velocities only have no position.
+        Left-hand sides of the rows, which are zero; rows on velocities only have no position.
     jacobian : Expressions
         Velocity = jacobian (v_F, w_F, v_M, w_M), (rows, 12).
     H_F, H_M : Expressions
         Angular velocity, world axes, from the rates of the Bryant angles: w = H bdot, (3, 3).
-    vectors : list of Vector or None
+    vectors : list of VectorForm or None
         The vector form of every row: as text, in Hahn's order of indices, and its building block.
     """
 
@@ -130,25 +130,25 @@ class JointEquations(SymbolTable):
 
     @property
     def position(self) -> Expressions:
-        """G, (rows,)."""
+        """Left-hand sides g, (rows,)."""
         return self._vector([m[0] for m in self._constructed])
 
     @property
     def velocity(self) -> Expressions:
-        """Gdot, (rows,): jacobian times the frames' velocities."""
+        """Rates of g, (rows,): jacobian times the frames' velocities."""
         speeds = object_vector([*self.F[3], *self.F[2], *self.M[3], *self.M[2]])
         return self._vector(self.jacobian.nodes @ speeds if self._constructed else [])
 
     @property
     def acceleration(self) -> Expressions:
-        """The second derivative, (rows,): jacobian times the frames' accelerations, and what velocities add."""
+        """Second derivative, (rows,): jacobian times the frames' accelerations, plus velocity terms."""
         gained = object_vector([*self.F[5], *self.F[4], *self.M[5], *self.M[4]])
         bias = object_vector([m[4] for m in self._constructed])
         return self._vector(self.jacobian.nodes @ gained + bias if self._constructed else [])
 
     @property
     def jacobian(self) -> Expressions:
-        """Along (v_F, w_F, v_M, w_M), (rows, 12)."""
+        """Jacobian along (v_F, w_F, v_M, w_M), (rows, 12)."""
         out = np.zeros((len(self._constructed), 12), object)
         for k, (_, f, tM, tF, _) in enumerate(self._constructed):
             out[k] = [*neg(f), *tF, *f, *tM]
@@ -157,12 +157,12 @@ class JointEquations(SymbolTable):
 
     @property
     def H_F(self) -> Expressions:
-        """W_F = H_F bdot."""
+        """Matrix H_F of w_F = H_F bdot."""
         return self._relation("F")
 
     @property
     def H_M(self) -> Expressions:
-        """W_M = H_M bdot."""
+        """Matrix H_M of w_M = H_M bdot."""
         return self._relation("M")
 
     def text(self, notation: str = "flyball") -> str:
@@ -171,7 +171,7 @@ class JointEquations(SymbolTable):
         Parameters
         ----------
         notation : {"flyball", "hahn"}
-            Of the vector form.
+            Notation of the vector form.
         """
         if notation not in ("flyball", "hahn"):
             raise ModelError(f"notation is {notation!r}; must be 'flyball' or 'hahn'")
@@ -223,7 +223,7 @@ class JointEquations(SymbolTable):
         return flat[0], tuple(flat[1:4]), tuple(flat[4:7]), tuple(flat[7:10]), flat[10]
 
     def _term(self, t: RowTerm, data: Any) -> np.ndarray:
-        """One term with all accelerations apart: value, force, torques on M and F, bias."""
+        """One term with the accelerations separated: value, force, torques on M and F, bias."""
         kind, par = t.kind, t.par
         zero = (0.0, 0.0, 0.0)
         F, M = (
@@ -245,7 +245,7 @@ class JointEquations(SymbolTable):
 def joint_equations(
     model: Model, parameters: Iterable[tuple[str, Node]], name: str, orientation: str
 ) -> JointEquations:
-    """A joint of a mechanism, with ``parameters`` of that as symbols."""
+    """Equations of a joint of a mechanism, with ``parameters`` as symbols."""
     joint = model[name]
     if not isinstance(joint, Joint):
         raise ModelError(f"{joint.title} is no joint; joints are {', '.join(j.name for j in model.joints)}")

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 
 class Lagrange:
-    """Equations of motion by Lagrange's formalism: of the same form as the others, M vdot = f + G^T lam.
+    """Equations of motion by Lagrange's formalism, in the form M vdot = f + G^T lam.
 
     Attributes
     ----------
     kinetic, potential : Expressions
-        Energies [J]: of all bodies; of gravity and of the forces whose energy is all that they take or give.
+        Energies [J] of the bodies, and of gravity and the conservative forces.
     forces : Expressions
-        Q, generalised forces of all others along the velocities, by their virtual power.
+        Q, generalised forces of all other elements along the velocities, by their virtual power.
     momenta : Expressions
         dK/dv.
     M, f : Expressions
@@ -87,7 +87,7 @@ class Lagrange:
 
     @cached_property
     def f(self) -> Expressions:
-        """All that is neither M vdot nor G^T lam, on the right-hand side, (nv,)."""
+        """Right-hand side without G^T lam, (nv,)."""
         x = self.equations.named_equations.traced
         rates = x.T @ object_vector(x.v)
         moved = jacobian(self.momenta.list(), x.q) @ rates
@@ -102,7 +102,7 @@ class Lagrange:
         return self.M @ eq.vdot - self.f - eq.G.T @ eq.lam
 
     def _turned(self) -> np.ndarray:
-        """W x dK/dw of all that turns about a point."""
+        """Terms w x dK/dw of everything that rotates about a point."""
         x = self.equations.named_equations.traced
         out = object_vector([0.0] * len(x.v))
         p = self.momenta.list()

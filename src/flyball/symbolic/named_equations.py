@@ -1,4 +1,4 @@
-"""A mechanism's equations of motion in its own names: the traced equations, in the coordinates of the user.
+"""Equations of motion with symbols named after the mechanism: the traced equations in the user's coordinates.
 
 Positions have the names of coordinates: ``"hinge.angle"``. A rate has a prime behind it, ``"crank.x'"``, an
 acceleration two. A body that is free in space has the Euler parameters ``e0`` to ``e3`` (scalar first) and the
@@ -53,7 +53,7 @@ class MechanismSymbols(NamedTuple):
     v: list[Symbol]
     vdot: list[Symbol]
     z: list[Symbol]
-    lam: list[Symbol]  # of the rows, then efforts of drivers that prescribe a coordinate
+    lam: list[Symbol]  # multipliers of the rows, then efforts of drivers that prescribe a coordinate
     loads: list[Symbol]
 
 
@@ -70,7 +70,7 @@ def mechanism_symbols(x: Values) -> MechanismSymbols:
 
 
 def _velocity(x: Values, name: str, unit: str) -> Symbol:
-    """The coordinate that a velocity is the rate of; an angular velocity is its own."""
+    """Symbol of the coordinate whose rate a velocity is; an angular velocity has its own symbol."""
     owner, _, what = name.rpartition(".")
     kind, _, axis = what.rpartition(" ")
     index = latex_part_name(owner)
@@ -83,7 +83,7 @@ def _velocity(x: Values, name: str, unit: str) -> Symbol:
 
 
 def _has_offset_centre(x: Values, owner: str) -> bool:
-    """Whether that is a body whose centre of mass is not its reference point."""
+    """Whether ``owner`` is a body whose centre of mass is not its reference point."""
     return owner in x.bodies and any(c.real != 0.0 for c in x.bodies[owner].com)
 
 
@@ -93,7 +93,7 @@ def _indexed(letter: str, index: str) -> str:
 
 
 def _coordinates(s: Structure, v: list[Symbol]) -> list[Symbol]:
-    """Those of every row of the body table."""
+    """Coordinates of every row of the body table."""
     out: list[Symbol] = []
     tree = s.tables["tree"]
     for b, (first, kind) in enumerate(zip(tree.v.tolist(), tree.joint.tolist(), strict=True)):
@@ -138,7 +138,7 @@ def _state(name: str) -> Symbol:
 
 
 def _multipliers(s: Structure) -> list[Symbol]:
-    """One for each row; what a driver or a coupling gives is its effort."""
+    """Multipliers, one for each row; those of drivers and couplings are efforts."""
     names = [_row_name(row.element, row.label) for row in s.rows]
     names = list(numbered_names(names))
     out = [_multiplier(s, name, row.element) for name, row in zip(names, s.rows, strict=True)]
@@ -166,7 +166,7 @@ def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
 
 
 def numbered_names(names: Iterable[str]) -> Iterable[str]:
-    """The names; from the second of equal ones on with a number behind."""
+    """The names; repeated names get a number."""
     seen: dict[str, int] = {}
     for name in names:
         seen[name] = seen.get(name, 0) + 1
@@ -174,7 +174,7 @@ def numbered_names(names: Iterable[str]) -> Iterable[str]:
 
 
 def latex_part_name(name: str) -> str:
-    """A name of the mechanism's in LaTeX."""
+    """Name of a part of the mechanism in LaTeX."""
     for c in "\\{}$&#^_%~":
         name = name.replace(c, rf"\{c}" if c in "{}$&#_%" else "-")
     return rf"\text{{{name}}}"
@@ -184,12 +184,12 @@ FULL_TURN = 2.0 * math.pi
 
 
 def with_whole_turns(x: Values, S: System) -> tuple[System, list[int]]:
-    """The tables with every angle counted, those of drivers too, and no row compared modulo a turn.
+    """Tables in which every angle counts whole turns, those of drivers too, and no row is compared modulo a turn.
 
     Returns
     -------
     System, list of int
-        For each state added behind the structure's own: the term that leans on it.
+        For each state appended to those of the structure: the term that uses it.
     """
     s = x.structure
     hint, parameters = S.terms.hint.copy(), S.term_parameters.copy()
@@ -211,7 +211,7 @@ class ClosedFormAngles:
         self._since = self._turned(W) if x.structure.model.planar else {}
 
     def of(self, owner: Any, what: str, F: int, M: int) -> Any:
-        """The angle of frame M to frame F that a term of that owner measures; None if it has no closed form."""
+        """Angle from frame F to frame M measured by a term of ``owner``; None if it has no closed form."""
         s, S = self.x.structure, self.x.system
         if isinstance(owner, Joint):
             row = coordinate_row(s, owner.name, what)
@@ -227,7 +227,7 @@ class ClosedFormAngles:
         return there - here - FULL_TURN * whole
 
     def _turned(self, W: Any) -> dict[int, Any]:
-        """Angle of every body of a planar mechanism: where it is drawn, and what coordinates have turned it since."""
+        """Angle of every body of a planar mechanism: reference angle plus its coordinates."""
         S, x = self.x.system, self.x
         since: list[Any] = []
         for b in range(len(S.tree.parent)):
@@ -247,7 +247,7 @@ class ClosedFormAngles:
         return 0.0 if b < 0 else self.x.bodies[names[b]].angle
 
     def _heading(self, frame: int) -> Any:
-        """The way that a frame's x axis points in its body."""
+        """Direction angle of a frame's x axis in its body."""
         R = self.x.system.frames.rotation[frame]
         return atan2(R[3], R[0])
 
@@ -257,13 +257,13 @@ def _real(x: Any) -> float:
 
 
 class TurnElimination:
-    """Expressions without the counting of turns, and with other nodes in place of some.
+    """Replaces nodes in expressions and removes the counting of turns.
 
     Parameters
     ----------
     graph : Graph
-    new : mapping from nodes to what stands in their place
-    unknown : nodes of remembered angles that have no closed form
+    new : pairs of nodes and their replacements
+    unknown : nodes of counted angles without a closed form
     """
 
     def __init__(self, graph: Graph, new: Sequence[tuple[Node, Any]], unknown: Sequence[Node]) -> None:
@@ -272,7 +272,7 @@ class TurnElimination:
         self._unknown = {x.index for x in unknown}
 
     def __call__(self, array: np.ndarray) -> np.ndarray:
-        """The same array, cleaned."""
+        """The array with the replacements made."""
         out = np.empty(array.shape, object)
         flat = array.ravel().tolist()
         for x in nodes_in_order(flat):
@@ -283,7 +283,7 @@ class TurnElimination:
 
     def _constructed(self, x: Node) -> Node:
         args = tuple(self._known[a.index] for a in x.args)
-        if x.op == "rounded" and not x.moving:  # whole turns as drawn
+        if x.op == "rounded" and not x.moving:  # whole turns in the reference configuration
             return self.graph.number(x.value)
         if x.op == ADD:
             found = _unwrapped(*args) or _unwrapped(args[1], args[0])
@@ -295,7 +295,7 @@ class TurnElimination:
 
 
 def _unwrapped(theta: Node, turns: Node) -> tuple[Node, Node] | None:
-    """Of theta + 2 pi rounded((near - theta) / 2 pi): theta and near."""
+    """(theta, near) of theta + 2 pi rounded((near - theta) / 2 pi); None for other expressions."""
     factor, inner = _factored(turns)
     if inner.op != "rounded" or abs(factor - FULL_TURN) > 1e-12:
         return None
@@ -319,22 +319,23 @@ def _factored(x: Node) -> tuple[float, Node]:
 
 @dataclass
 class CurveParameter:
-    """Where a follower is on its curve: a symbol, the equation that it fulfils, and how fast it moves."""
+    """Curve parameter of a follower: its symbol, its equation, and its rate."""
 
     symbol: Node
-    equation: Any  # zero there
+    equation: Any  # residual that is zero
     rate: Any
     term: int
 
 
 @dataclass
 class NamedEquations:
-    """Equations of motion in a mechanism's own names. All arrays are of nodes or numbers."""
+    """Equations of motion with symbols named after the mechanism. All arrays contain nodes or numbers."""
 
-    values: Values  # its tables hold objects
-    traced: TracedEquations  # with the rows of prescribed coordinates, which the engine has not
-    user_q: list[Any]  # the engine's coordinates: those of `trace_equations` less what they are as drawn
-    drawn: list[Any]  # that
+    values: Values  # its tables contain objects
+    traced: TracedEquations  # with rows for prescribed coordinates, which the engine does not have
+    # The engine's coordinates: those of `trace_equations` minus their reference values.
+    user_q: list[Any]
+    drawn: list[Any]  # these reference values
     vdot: list[Node]
     places: list[CurveParameter]
     cleaned: TurnElimination
@@ -342,12 +343,12 @@ class NamedEquations:
 
 
 def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
-    """Trace a mechanism and tell its equations in its own names.
+    """Trace a mechanism and name its equations after its parts.
 
     Parameters
     ----------
     x : Values
-        Filled in with numbers or with expressions of ``graph``.
+        Tables filled with numbers or with expressions of ``graph``.
     graph : Graph
     """
     s = x.structure
@@ -375,7 +376,7 @@ def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
 
 
 def _reference_values(S: Any, nq: int) -> list[Any]:
-    """Values of the coordinates as drawn, where the engine's are zero."""
+    """Values of the coordinates in the reference configuration, where the engine's are zero."""
     out: list[Any] = [0.0] * nq
     for b in range(len(S.tree.parent)):
         if S.bodies.offset[b] != 0.0:
@@ -384,7 +385,7 @@ def _reference_values(S: Any, nq: int) -> list[Any]:
 
 
 def _curve_parameters(x: Values, T: TracedEquations) -> tuple[list[CurveParameter], list[Node]]:
-    """Places on curves with their equations, and the iterations that find them in the engine."""
+    """Curve parameters with their equations, and the nodes of the engine's iterations for them."""
     S, W = T.system, T.work
     places, feet = [], []
     for k, t in enumerate(x.structure.terms):
@@ -427,7 +428,7 @@ def _cleaner(
 
 
 def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
-    """Coordinates that drivers prescribe as constraints: q = f(t), of which the multiplier is the effort."""
+    """Coordinates that drivers prescribe as constraints q = f(t), with the effort as multiplier."""
     s = T.structure
     order = sorted(s.prescribed, key=lambda k: s.slices[k].start)
     g, nu, G, gamma = [], [], np.zeros((len(order), s.nv), object), []
@@ -464,7 +465,7 @@ def _cleaned_entry(cleaned: TurnElimination, x: Any) -> Any:
 
 
 def quaternions(x: NamedEquations) -> list[list[Node]]:
-    """The symbols of every quaternion, four each."""
+    """Symbols of every quaternion, four each."""
     out = []
     tree = x.traced.system.tree
     for kind, q in zip(tree.joint.tolist(), tree.q.tolist(), strict=True):
@@ -474,11 +475,11 @@ def quaternions(x: NamedEquations) -> list[list[Node]]:
     return out
 
 
-CURVE_SAMPLES = 20  # of a curve between two of its breaks that are looked at first
+CURVE_SAMPLES = 20  # initial samples of a curve between two breaks
 
 
 def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
-    """The engine's arrays by the names of the symbols."""
+    """Arrays of the engine as values by symbol names."""
     T = x.traced
     out: dict[str, Any] = {T.t.data.name: t}
     for symbol, drawn, value in zip(T.q, x.drawn, q, strict=True):
@@ -487,19 +488,19 @@ def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -
 
 
 def _python_number(x: Any) -> Any:
-    """A number as Python's own."""
+    """Convert to a Python number."""
     return x.item() if isinstance(x, np.generic) else x
 
 
 def curve_parameters_at(
     x: NamedEquations, places: Sequence[CurveParameter], values: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Places on curves of followers: the points of the curves nearest to them, at one instant.
+    """Curve parameters of followers: the nearest points of the curves, at one time.
 
     Raises
     ------
     ModelError
-        If the values are arrays, of which each instant would have places of its own.
+        If the values are arrays: every time would have its own curve parameters.
     """
     S, W, out = x.traced.system, x.traced.work, {}
     if any(np.ndim(v) for v in values.values()):
@@ -520,7 +521,7 @@ def curve_parameters_at(
 
 
 def nearest_curve_parameter(kind: Kind, par: tuple[float, ...], F: tuple, M: tuple, data: np.ndarray) -> float:
-    """Parameter of the point of a curve that is nearest to M: of points on it the nearest, then by Newton's method."""
+    """Parameter of the point of a curve nearest to M: the nearest sample, refined by Newton's method."""
     at = int(par[1])
     breaks = data[at + BREAKS : at + BREAKS + int(data[at + 1])]
     s = np.linspace(breaks[0], breaks[-1], CURVE_SAMPLES * len(breaks))

@@ -16,27 +16,27 @@ from .named_equations import latex_part_name
 
 AXES = "xyz"
 FIELD_LETTERS = {"mass": "m", "inertia": "J", "stiffness": "k", "damping": "d", "length": "l", "radius": "r"}
-CATEGORIES = ("bodies", "frames", "joints", "couplings", "forces")  # whose numbers stand in the equations
-OWNER_SUFFIX = "_of_"  # what names of parameters end with that nobody has written
-EXCLUDED_FIELDS = ("velocity", "angular_velocity")  # fields that are of the start only
-MAX_COMPONENTS = 3  # numbers of one field; lists of more are profiles and outlines
+CATEGORIES = ("bodies", "frames", "joints", "couplings", "forces")  # categories whose numbers occur in the equations
+OWNER_SUFFIX = "_of_"  # suffix of generated parameter names
+EXCLUDED_FIELDS = ("velocity", "angular_velocity")  # fields of the initial state only
+MAX_COMPONENTS = 3  # longest field; longer lists are profiles and outlines
 
 
 class ParametrizedModel:
     """A copy of a model in which numbers are parameters.
 
-    ``"rod.mass"``, ``"A.at_x"``; ``"rod.offset_x"`` is where the centre of mass is on the body, ``"A.angle_drawn"``
-    what a coordinate is as drawn, and ``"g"`` gravity that acts along one axis.
+    Names are ``"rod.mass"``, ``"A.at_x"``. ``"rod.offset_x"`` is the position of the centre of mass on the body,
+    ``"A.angle_drawn"`` the reference value of a coordinate, and ``"g"`` gravity that acts along one axis.
 
-    Zeros stay zeros, and directions stay as they are: symbols in them would hide what is simple. So do laws, tables,
-    profiles of cams and outlines of shapes, and what is said of the start only.
+    Zeros and directions stay numbers: symbols would hide simple formulas. Laws, tables, profiles of cams, outlines of
+    shapes and data of the initial state are not changed.
 
     Attributes
     ----------
     model : Model
         The copy.
     symbols : dict of str to Symbol
-        Parameter of the copy -> what it is called.
+        Parameter of the copy -> its symbol.
     """
 
     def __init__(self, model: Model) -> None:
@@ -70,7 +70,7 @@ class ParametrizedModel:
         return out
 
     def _matrix(self, rows: tuple, owner: str, field: str, dimension: str | None) -> tuple:
-        """Points, or a symmetric matrix: entries across the diagonal are one number."""
+        """Points, or a symmetric matrix, whose mirrored entries are one parameter."""
         if field != "inertia":
             return tuple(self._value(row, owner, f"{field}_{k + 1}", dimension) for k, row in enumerate(rows))
         upper = {
@@ -107,7 +107,7 @@ class ParametrizedModel:
         return tuple(shapes) if isinstance(body.shape, tuple) else shapes[0]
 
     def _gravity(self) -> None:
-        """Of one component: g, along or against the axis."""
+        """Gravity with one component: g, along or against the axis."""
         given = self.model.gravity
         if not isinstance(given, tuple):
             return
@@ -128,7 +128,7 @@ class ParametrizedModel:
 
 
 def field_symbol_name(e: Any, field: str) -> str:
-    """What a field is called that has the name of what moves: as drawn."""
+    """Symbol name of a field; a field named like a coordinate gets ``_drawn``."""
     if isinstance(e, Joint) and field in {c.offset for c in e.coordinates.values()}:
         return f"{field}_drawn"
     if isinstance(e, Body):

@@ -340,7 +340,7 @@ class SwitchSpec:
     law: int = -1
     other: int = -1
     partner: int = -1
-    held: bool = False  # closed initially
+    held: bool = False  # initially
 
 
 def declared_switches(model: Model) -> list[tuple[Element, Switch]]:

@@ -158,7 +158,8 @@ def _convex_parts(form: ConvexPart) -> ConvexParts:
     if found.beyond > PART_TOLERANCE * size:
         warn_user(
             f"a surface of {form.face.size // 3} triangles is {MAX_PARTS} convex parts where it touches others, and "
-            f"these still fill up to {found.beyond:.3g} m of its hollows; describe it by simpler shapes where that matters",
+            f"these still fill up to {found.beyond:.3g} m of its hollows; describe it by simpler shapes where "
+            f"that matters",
             PerformanceNotice,
         )
     return found

@@ -330,7 +330,7 @@ def _offset(t: TermSpec, numbers: Mapping) -> float:
 
 
 def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
-    """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
+    """Reference value of a coupled coordinate: its value in the reference configuration, unless the sum is given."""
     total = e.total(n)
     if total is None:
         return pose.drawn(t)

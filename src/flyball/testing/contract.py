@@ -54,8 +54,7 @@ def sample_mechanism(
     Q: np.ndarray | None = None,
     d: np.ndarray | None = None,
 ) -> Mechanism:
-    """Return a mechanism with the element and the bodies, frames and joints that it names: bodies of about 1 kg and 1
-    m, in gravity.
+    """Return a mechanism with the element, and the bodies (about 1 kg and 1 m), frames and joints that it names.
 
     Each body is joined to an arm that is hinged on ground, so that joint coordinates differ from absolute ones.
 

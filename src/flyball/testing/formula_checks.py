@@ -249,7 +249,10 @@ def complex_numbers(s: Subject) -> str:
             real, plain, fast = state.at(x.tolist()), state.at(given.tolist()), state.compiled(given, True)
             for found, how in ((plain, "in Python"), (fast, "compiled")):
                 if _differ(real, np.real(found), ROUNDING):
-                    return f"{state.signature} is {_array_text(real)} on floats and {_array_text(found)} on complex numbers {how}"
+                    return (
+                        f"{state.signature} is {_array_text(real)} on floats and {_array_text(found)} on complex "
+                        f"numbers {how}"
+                    )
             if _differ(np.imag(plain) / STEP, np.imag(fast) / STEP, ROUNDING, np.abs(real).max()):
                 return f"{state.signature}: derivatives by complex numbers differ between Python and compiled code"
     return ""
@@ -272,7 +275,8 @@ def derivatives(s: Subject) -> str:
             if all(_differ(exact, d, SLOPE, size) for d in near):
                 return (
                     f"the derivatives of {state.signature} by a complex step are {_array_text(exact)}, and "
-                    f"{_array_text(near[1])} by differences; abs(), max(), math.sqrt() and the like lose imaginary parts: "
+                    f"{_array_text(near[1])} by differences; abs(), max(), math.sqrt() and the like lose "
+                    f"imaginary parts: "
                     f"use functions of flyball.math.scalar"
                 )
     return ""
@@ -397,7 +401,8 @@ def axes(s: Subject) -> str:
         if _differ(list(flat_numbers(wanted)), list(flat_numbers(there)), WORLD, 1e-3):
             return (
                 f"{state.signature} depends on the axes or the origin of the world: frames turned and shifted together "
-                f"give {_array_text(list(flat_numbers(there)))}, and must give {_array_text(list(flat_numbers(wanted)))}. For an element that "
+                f"give {_array_text(list(flat_numbers(there)))}, and must give "
+                f"{_array_text(list(flat_numbers(wanted)))}. For an element that "
                 f"is given in the world's axes skip the checks 'axes' and 'turned'"
             )
     return ""
@@ -414,7 +419,8 @@ def units(s: Subject) -> str:
         if _differ(wanted, found, WORLD):
             return (
                 f"{state.signature} in other units of length, mass and time is {_array_text(found)}, and must be "
-                f"{_array_text(wanted)}: a constant in it has a unit, or a field has another unit than its formula needs"
+                f"{_array_text(wanted)}: a constant in it has a unit, or a field has another unit than "
+                f"its formula needs"
             )
     return ""
 

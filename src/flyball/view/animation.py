@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def part_facts(result: Result) -> dict[str, tuple[str, ...]]:
-    """Lines about every part, by its name: its kind, what it joins, a body's mass."""
+    """Return lines about every part, by its name: its kind, connected parts, a body's mass."""
     out: dict[str, tuple[str, ...]] = {}
     for e in result.model.elements():
         if e.category == "bodies":
@@ -50,7 +50,7 @@ def part_facts(result: Result) -> dict[str, tuple[str, ...]]:
 
 
 def attachment_text(e: Any) -> str:
-    """What an element joins or acts on, in words."""
+    """Return what an element connects or acts on."""
     if hasattr(e, "body_i"):
         return f"{e.body_i} – {e.body_j}"
     if hasattr(e, "bodies"):
@@ -69,8 +69,8 @@ def attachment_text(e: Any) -> str:
     return f"of {measured}" if isinstance(measured, str) else ""
 
 
-MAX_TIMES = 2000  # times in a recording, about
-MAX_SET_POSES = 1_500_000  # of members of sets in a recording, at most
+MAX_TIMES = 2000  # approximate number of times in a recording
+MAX_SET_POSES = 1_500_000  # largest number of poses of set members in a recording
 MAX_CURVES = 60
 DEFAULT_SHOW = ("loads", "moments", "grid")
 
@@ -78,16 +78,16 @@ PathRequest = str | tuple[str, Any]
 
 
 def animation_html(result: Result, *, paths: Iterable[PathRequest] = (), show: Collection[str] = DEFAULT_SHOW) -> str:
-    """The animation page of a result: one HTML document that needs nothing else.
+    """Return the animation page of a result: one self-contained HTML document.
 
     Parameters
     ----------
     result : Result
     paths : names, or (body, point) pairs
-        Whose paths are drawn: the origins of bodies or frames of these names, or points [m] of bodies, counted from
-        their reference frames: ``paths=["P", ("coupler", (0.1, 0.2))]``.
+        Paths to draw: of the origins of bodies or frames, or of points [m] of bodies, in their reference frames:
+        ``paths=["P", ("coupler", (0.1, 0.2))]``.
     show : names
-        What is switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
+        Displays switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
 
     Raises
     ------
@@ -109,10 +109,10 @@ def record_motion(
 ) -> Recording:
     """Make the recording that pictures and pages read; see `animation_html`.
 
-    Without ``curves`` it has no curves and arrows, unless ``with_notes`` no notes and facts of parts.
+    Without ``curves`` it has no curves and arrows, without ``with_notes`` no notes and facts of parts.
 
-    Bodies are placed by their reference frames, so that shapes lie on them as the user gave them. Bodies without
-    shapes get some that follow from their joints and inertia.
+    Poses are those of reference frames, so that shapes appear as the user gave them. Bodies without shapes get shapes
+    derived from their joints and inertia.
     """
     if not len(result.t):
         raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
@@ -160,10 +160,10 @@ def record_motion(
 
 
 class DisplayedMotion(NamedTuple):
-    """A motion with the states around its events, and which of its times are shown.
+    """A motion with the states around its events, and the displayed times.
 
-    ``every`` are their indices, ``near`` those of the nearest output times of the motion as it was given, ``instead``
-    these in the motion itself.
+    ``every`` are their indices, ``near`` those of the nearest output times of the original motion, ``instead`` the
+    latter's indices in the extended motion.
     """
 
     motion: Result
@@ -173,7 +173,7 @@ class DisplayedMotion(NamedTuple):
 
 
 def motion_to_show(result: Result) -> DisplayedMotion:
-    """What is shown of a motion; all that is around events."""
+    """Return the displayed motion, with all states around events."""
     chosen = thinned_times(len(result.t), sum(map(len, result.bulk.values())))
     whole, near, more = add_event_states(result)
     every = np.flatnonzero(more | np.isin(near, chosen))
@@ -181,9 +181,9 @@ def motion_to_show(result: Result) -> DisplayedMotion:
 
 
 def thinned_times(n: int, members: int = 0) -> np.ndarray:
-    """Indices of the times that are shown: all, or about 2000 evenly chosen, first and last among them.
+    """Return the indices of the displayed times: all, or about 2000 evenly chosen, including first and last.
 
-    Fewer of so many members of sets of bodies that the page would become too large.
+    Fewer if sets have so many members that the page would become too large.
     """
     most = max(2, min(MAX_TIMES, MAX_SET_POSES // max(members, 1)))
     return np.arange(n) if n <= most * 1.25 else np.unique(np.linspace(0, n - 1, most).round().astype(int))
@@ -204,7 +204,7 @@ def _gravity_direction(result: Result) -> tuple[float, float, float]:
 
 
 def _body_poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position and quaternion of a body's reference frame."""
+    """Return position and quaternion of a body's reference frame."""
     view = result[name]
     p = np.zeros((len(every), 3))
     p[:, : 2 if result.planar else 3] = view.position[every]
@@ -217,7 +217,7 @@ def _body_poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarra
 def _symbols_and_lines(
     result: Result, places: AttachedFrames, looks: BodyShapes, every: np.ndarray
 ) -> Iterator[SymbolPart]:
-    """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
+    """Return symbols of joints and couplings; lines of springs, dampers, ropes and links."""
     m = result.model
     wheels: list[GearWheel] = []
     for e in (*m.joints, *m.couplings):
@@ -237,7 +237,7 @@ def _symbols_and_lines(
 
 
 def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLine | None:
-    """A force element along a line: a rope with its free length, a spring, or a damper where nothing is stiff."""
+    """Return the line of a force element: a rope with its free length, a spring, or a damper without stiffness."""
     ends = rope_ends(places, e.name)
     numbers = places.result.values.numbers[e.name]
     if len(ends) > 1:
@@ -251,7 +251,7 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
 
 
 def _free_length(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
-    """Free length of a rope: as given, else as drawn, for which the first time has to serve."""
+    """The free length of a rope: as given, else that at the first time, in place of the reference configuration."""
     if getattr(numbers, "length", None) is not None:
         return np.full(len(points[0]), float(numbers.length))
     steps = [b[:1] - a[:1] for a, b in pairwise(points)]
@@ -259,7 +259,7 @@ def _free_length(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
 
 
 def _recorded_frames(result: Result, places: AttachedFrames) -> Iterator[RecordedFrame]:
-    """Axes of joints, on their first body, and of named frames."""
+    """Return axes of joints, on their first body, and named frames."""
     for joint in result.model.joints:
         F = places.end(joint.name, "F")
         if F is not None:
@@ -274,7 +274,7 @@ def _recorded_frames(result: Result, places: AttachedFrames) -> Iterator[Recorde
 
 
 def _recorded_path(result: Result, path: PathRequest) -> RecordedPath:
-    """A path as asked for: the origin of a body or frame, or a point of a body."""
+    """Return a requested path: of the origin of a body or frame, or of a point of a body."""
     m = result.model
     if isinstance(path, str):
         part = m[path]
@@ -298,7 +298,7 @@ def _recorded_path(result: Result, path: PathRequest) -> RecordedPath:
 
 
 def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
-    """All curves of a small mechanism; of a big one energies, drivers, forces, joint coordinates, then bodies."""
+    """All curves of a small mechanism; of a large one energies, drivers, forces, joint coordinates, then bodies."""
     if 8 * (len(result.model.bodies) + len(result.model.joints)) <= 400:
         curves = result.channels()
         curves = {k: c for k, c in curves.items() if np.isfinite(c[1]).any()}
@@ -323,7 +323,7 @@ def _parts_with_curves(result: Result) -> list:
 
 
 def _is_main_curve(name: str, result: Result) -> bool:
-    """Whether a curve says where something is, or what a driver, force or controller does: no rate, no reaction."""
+    """Return whether a curve is a position, or an effort of a driver, force or controller; not a rate or reaction."""
     owner, _, what = name.partition(".")
     if owner == "energy" or result.model[owner].category in ("drivers", "forces", "sensors"):
         return True
@@ -333,21 +333,21 @@ def _is_main_curve(name: str, result: Result) -> bool:
 
 
 def _main_curves(names: list[str], result: Result) -> list[str]:
-    """At most as many names as are shown, those that say most; in their order."""
+    """Return the most important names, at most as many as are shown, in their order."""
     rank = {k: (not _is_main_curve(k, result), i) for i, k in enumerate(names)}
     chosen = set(sorted(names, key=rank.__getitem__)[:MAX_CURVES])
     return [k for k in names if k in chosen]
 
 
 def initial_channels(result: Result, names: Collection[str]) -> tuple[str, ...]:
-    """The curves on show when a page opens.
+    """Return the curves shown when a page opens.
 
-    What is measured; what a controller is to follow, what follows, and what it says; what a driver needs; a joint's
-    coordinate of each kind (else a position); energies.
+    They are sensors; reference, response and output of controllers; efforts of drivers; a joint coordinate of each kind
+    (else a position); energies.
     """
     m = result.model
     measured = [f"{s.name}.value" for s in m.sensors][:2]
-    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown beside one another
+    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown together
     kinds: dict[str, str] = {}
     for j in m.joints:
         for k, c in j.coordinates.items():
@@ -362,7 +362,7 @@ def initial_channels(result: Result, names: Collection[str]) -> tuple[str, ...]:
 
 
 def equilibrium_page(found: Equilibrium) -> str:
-    """The page's text."""
+    """Return the page of an equilibrium."""
     notes: dict[str, str] = {}
     for label, text in found.lines():
         notes[label] = f"{notes[label]}; {text}" if label in notes else text

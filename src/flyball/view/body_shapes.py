@@ -1,8 +1,7 @@
 """Shapes of bodies: as the user gave them, or from joints and inertia; simplification of meshes.
 
-Meshes are made small enough for a page: vertices are gathered in the cells of a grid, and each cell's vertices
-become one, put where it is nearest to the planes of the cell's triangles (P. Lindstrom, "Out-of-core
-simplification of large polygonal models", SIGGRAPH 2000).
+Meshes are simplified to fit into a page: the vertices in each cell of a grid are merged into the point nearest to the
+planes of the cell's triangles (P. Lindstrom, "Out-of-core simplification of large polygonal models", SIGGRAPH 2000).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 
 PLANE_TOLERANCE = (
-    1e-3  # directions in which a cell's planes say less than this part of the most they say are left to its middle
+    1e-3  # relative singular value below which a cell's planes do not determine a direction; the middle is used then
 )
 
 
@@ -35,7 +34,7 @@ def simplify_mesh(vertices: np.ndarray, triangles: np.ndarray, most: int) -> tup
     vertices : ndarray (k, 3) [m]
     triangles : ndarray (m, 3) of int
     most : int
-        Number of triangles to keep at most; a mesh that has no more keeps its form exactly.
+        Largest number of triangles; a mesh with no more is unchanged.
 
     Returns
     -------
@@ -47,7 +46,7 @@ def simplify_mesh(vertices: np.ndarray, triangles: np.ndarray, most: int) -> tup
         return vertices, triangles
     low = vertices.min(axis=0)
     extent = float((vertices.max(axis=0) - low).max())
-    coarse, fine = 1, 1024  # cells along the longest side
+    coarse, fine = 1, 1024  # number of cells along the longest side
     while fine - coarse > 1:
         middle = (coarse + fine) // 2
         cells = _cell_numbers(vertices - low, extent / middle)
@@ -61,7 +60,7 @@ def simplify_mesh(vertices: np.ndarray, triangles: np.ndarray, most: int) -> tup
 
 
 def _weld_vertices(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Equal vertices made one, unused ones and empty or repeated triangles left out."""
+    """Merge equal vertices; remove unused ones and empty or repeated triangles."""
     used, index = np.unique(triangles, return_inverse=True)
     points, same = np.unique(vertices[used], axis=0, return_inverse=True)
     t = same.reshape(-1)[index.reshape(triangles.shape)]
@@ -73,25 +72,25 @@ def _weld_vertices(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
 
 
 def _cell_numbers(p: np.ndarray, edge: float) -> np.ndarray:
-    """Number of each point's cell, counted from 0 over the cells that hold any."""
+    """Return the number of each point's cell, counted over non-empty cells."""
     k = (p / edge).astype(np.int64)
     n = k.max(axis=0) + 1
     return np.unique((k[:, 0] * n[1] + k[:, 1]) * n[2] + k[:, 2], return_inverse=True)[1].reshape(-1)
 
 
 def _spans_three_cells(cells: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Which triangles have their corners in three cells."""
+    """Return which triangles have their corners in three cells."""
     a, b, c = cells[triangles].T
     return (a != b) & (b != c) & (c != a)
 
 
 def _cell_vertices(vertices: np.ndarray, triangles: np.ndarray, cells: np.ndarray, edge: float) -> np.ndarray:
-    """For each cell the point with the least sum of squared distances from its triangles' planes, in the cell."""
+    """Return for each cell the point in it with the least sum of squared distances from its triangles' planes."""
     count = int(cells.max()) + 1
     number = np.bincount(cells, minlength=count)
     middle = np.stack([np.bincount(cells, vertices[:, i], count) for i in range(3)], axis=1) / number[:, None]
     p, q, r = (vertices[triangles[:, k]] for k in range(3))
-    normal = np.cross(q - p, r - p)  # its length weighs a triangle by its area
+    normal = np.cross(q - p, r - p)  # its length weights a triangle by its area
     A, b = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for k in range(3):
         home = cells[triangles[:, k]]
@@ -102,15 +101,15 @@ def _cell_vertices(vertices: np.ndarray, triangles: np.ndarray, cells: np.ndarra
     firm = w > PLANE_TOLERANCE * w[:, -1:]
     inverse = np.where(firm, 1.0 / np.where(firm, w, 1.0), 0.0)
     shift = np.einsum("nij,nj,nkj,nk->ni", V, inverse, V, b)
-    far = np.abs(shift).max(axis=1) > edge  # planes that meet outside of the cell say nothing about it
+    far = np.abs(shift).max(axis=1) > edge  # an intersection of planes outside the cell is meaningless
     shift[far] = 0.0
     return middle + shift
 
 
-LINK_RADIUS = 0.045  # radius of a link, as part of the mechanism's typical length
-MAX_TRIANGLES = 24_000  # of all meshes of a recording
-MIN_MESH_TRIANGLES = 300  # triangles that a mesh keeps, however many others there are
-MIN_SYMBOL_SCALE = 0.5  # a symbol on slender parts, as part of its usual size
+LINK_RADIUS = 0.045  # radius of a link, relative to the mechanism's typical length
+MAX_TRIANGLES = 24_000  # number of triangles of all meshes of a recording
+MIN_MESH_TRIANGLES = 300  # number of triangles that a mesh keeps in any case
+MIN_SYMBOL_SCALE = 0.5  # size of a symbol on slender parts, relative to its usual size
 
 
 class BodyShapes:
@@ -132,7 +131,7 @@ class BodyShapes:
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
         self.blocks: dict[str, list[AttachedFrame]] = {b.name: [] for b in result.model.bodies}
         self.cams: dict[str, list[Any]] = {b.name: [] for b in result.model.bodies}
-        self.shown_by_symbol: set[str] = set()  # bodies that a symbol such as a gear wheel shows
+        self.shown_by_symbol: set[str] = set()  # bodies represented by a symbol such as a gear wheel
         for e in (*result.model.joints, *result.model.forces):
             self._attach(e)
         reach = {name: self._reach(name) for name in self.points}
@@ -140,7 +139,7 @@ class BodyShapes:
         self.size = float(np.median(known)) if known else result.values.length
 
     def _attach(self, e: Any) -> None:
-        """Note an element's points on its bodies; of a slide, the block on one and the guide's ends on the other."""
+        """Store an element's points on its bodies; for a slide, the block on one and the guide's ends on the other."""
         ends = self.places.ends(e)
         if ends is None:
             k = 0
@@ -179,12 +178,12 @@ class BodyShapes:
             self.points[body].append(p)
 
     def _mass(self, name: str) -> tuple[np.ndarray, np.ndarray, float]:
-        """Centre of mass, inertia and mass of a body; 1 kg where it has none, and so no inertia."""
+        """Return centre of mass, inertia and mass of a body; 1 kg, without inertia, if it has none."""
         b = self.result.values.bodies[name]
         return b.com.real, np.asarray(b.inertia).real, float(np.real(b.mass)) or 1.0
 
     def _reach(self, name: str) -> float:
-        """How long a body is, from the points that are known on it."""
+        """Return the length of a body, from its known points."""
         points = [*self.points[name], self._mass(name)[0]]
         if len(self.points[name]) == 1:
             com, J, m = self._mass(name)
@@ -195,11 +194,11 @@ class BodyShapes:
         return float(np.sqrt(((a[:, None] - a[None]) ** 2).sum(axis=2)).max())
 
     def given(self, name: str) -> bool:
-        """Whether the user gave the body a shape."""
+        """Return whether the user gave the body a shape."""
         return bool(self._solids.get(name))
 
     def fit_symbol(self, symbol: RecordedJoint) -> RecordedJoint | None:
-        """A joint's symbol as it is drawn: smaller on slender parts, and none where the body has its own shape."""
+        """Return a joint's symbol as drawn: smaller on slender parts, and none if the body has its own shape."""
         if symbol.kind in BODY_SYMBOLS:
             if self.given(symbol.body):
                 return None
@@ -213,7 +212,7 @@ class BodyShapes:
         )
 
     def _width(self, name: str) -> float:
-        """The middle one of the three extents of a body's slenderest given shape [m]."""
+        """Return the middle one of the three extents of a body's slenderest given shape [m]."""
         out = []
         solids: tuple[Any, ...] = self._solids[name]
         for s in solids:
@@ -228,7 +227,7 @@ class BodyShapes:
         return min(out, default=np.inf)
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
-        """The body's shapes."""
+        """Return the body's shapes."""
         if self.given(name):
             return tuple(self._given(s) for s in self._solids[name])
         points = self.points[name]
@@ -244,18 +243,18 @@ class BodyShapes:
         return tuple(out)
 
     def _mesh_share(self) -> float:
-        """Part of their triangles that meshes may keep, so that the page stays small."""
+        """Return the fraction of their triangles that meshes may keep, so that the page stays small."""
         total = sum(
             len(s.mesh(self._numbers[id(s)])[1]) for solids in self._solids.values() for s in solids if _needs_mesh(s)
         )
         return min(1.0, MAX_TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
-        """A shape as the user gave it."""
+        """Return a shape as given by the user."""
         return shape_from_solid(s, self._numbers[id(s)], self._share)
 
     def _cam(self, e: Any) -> list[Shape]:
-        """The disc that a cam's outline bounds."""
+        """Return the disc bounded by a cam's outline."""
         ends = self.places.ends(e)
         n = self.result.values.numbers[e.name]
         outline = cam_outline(n)
@@ -278,7 +277,7 @@ class BodyShapes:
         return Shape("capsule", (slim * self._radius(length), length), float_triple((a + b) / 2), _rotation_to(d))
 
     def _links(self, points: list[np.ndarray]) -> list[Shape]:
-        """One link between two points (or along a line), a plate between those of a plane, else spokes."""
+        """Return one link between two points (or along a line), a plate between those of a plane, else spokes."""
         a = np.array(points)
         middle = a.mean(axis=0)
         _, d, Vt = np.linalg.svd(a - middle)
@@ -294,7 +293,7 @@ class BodyShapes:
         return [hub, *(self._capsule(middle, p) for p in a)]
 
     def _plate(self, a: np.ndarray, p: np.ndarray, R: np.ndarray) -> Shape:
-        """The outline around points of the x-y plane of the axes R at p, each with room for a pin."""
+        """Return the outline around points of the x-y plane of the axes R at p, with a margin for pins."""
         from scipy.spatial import ConvexHull
 
         r = 1.2 * LINK_RADIUS * self.size * (1.0 if self.planar else 0.8)
@@ -305,13 +304,13 @@ class BodyShapes:
         return Shape("plate", (0.5 * r,), float_triple(p), tuple(matrix_to_quaternion(R).tolist()), outline)
 
     def _block(self, end: AttachedFrame) -> Shape:
-        """The block of a slide, along its axis."""
+        """Return the block of a slide, along its axis."""
         u = self.size
         edges = (0.16 * u, 0.16 * u, 0.26 * u) if not self.planar else (0.15 * u, 0.15 * u, 0.26 * u)
         return Shape("box", edges, float_triple(end.p), tuple(matrix_to_quaternion(end.R).tolist()))
 
     def _hung(self, p: np.ndarray, name: str) -> list[Shape]:
-        """A body on one joint: a rod if its inertia is that of one, else a rod to the solid it is equivalent to."""
+        """Return a body on one joint: a rod if it has a rod's inertia, else a rod and the equivalent solid."""
         com, J, m = self._mass(name)
         arm = com - p
         d = float(np.sqrt(arm @ arm))
@@ -326,7 +325,7 @@ class BodyShapes:
         return [self._capsule(p, com, 0.4 if self.planar else 1.0), self._solid(name)]
 
     def _solid(self, name: str) -> Shape:
-        """The homogeneous solid with the body's inertia: ball, cylinder or box; a disc in the plane."""
+        """Return the homogeneous solid with the body's inertia: ball, cylinder or box; a disc in the plane."""
         com, J, m = self._mass(name)
         least = 0.08 * self.size
         if self.planar:
@@ -353,9 +352,9 @@ class BodyShapes:
 
 
 def shape_from_solid(s: Any, n: Any, share: float = 1.0) -> Shape:
-    """A solid of the model, with its numbers, as it is drawn; meshes keep a share of their triangles.
+    """Return a solid of the model as it is drawn; meshes keep a fraction of their triangles.
 
-    A cone is counted from its middle in pictures.
+    The origin of a cone is its middle in pictures.
     """
     if _needs_mesh(s):
         v, t = s.mesh(n)
@@ -371,7 +370,7 @@ def shape_from_solid(s: Any, n: Any, share: float = 1.0) -> Shape:
 
 
 def _shape_extents(kind: str, size: tuple[float, ...]) -> list[float]:
-    """Lengths of a primitive along its own axes [m]."""
+    """Return the lengths of a primitive along its own axes [m]."""
     if kind == "Box":
         return [float(x) for x in size]
     if kind == "Ellipsoid":
@@ -387,10 +386,10 @@ def _unit_vector(d: np.ndarray) -> np.ndarray:
 
 
 def _rotation_to(d: np.ndarray) -> tuple[float, float, float, float]:
-    """Quaternion that turns z to the direction d."""
+    """Return the quaternion that turns z to the direction d."""
     return tuple(matrix_to_quaternion(triad(_unit_vector(d))).tolist())  # type: ignore[return-value]
 
 
 def _needs_mesh(s: Any) -> bool:
-    """Whether the player has no figure of its own for a shape."""
+    """Return whether the player has no primitive for a shape."""
     return type(s) not in (Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere)

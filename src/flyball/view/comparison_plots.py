@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     from ..results.comparison import Comparison
 
-SMALLEST_SHOWN = 1e-18  # what is drawn for a violation of zero
+SMALLEST_SHOWN = 1e-18  # value drawn for a violation of zero
 
 
 def comparison_plot(comparison: Comparison, path: str | os.PathLike | None = None) -> Any:
-    """Violations of positions and velocities and the deviation of energy over time, logarithmic; cost as bars.
+    """Draw violations of positions and velocities and the energy deviation over time (logarithmic), and cost as bars.
 
     Parameters
     ----------

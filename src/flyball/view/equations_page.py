@@ -9,13 +9,13 @@ from ..symbolic.document.parts import Block, Cell, DataTable, Display, Document,
 from ..symbolic.document.writers import aligned_lines, fits_width, matrix_cells, nonzero_entries
 from .page import fill_template, static
 
-FORMULA_WIDTH = 112  # letters in a line of a formula
-CELL_WIDTH = 46  # letters in an entry of a matrix, which may be wide altogether: it scrolls
-FOLDED_FROM = 40  # rows of a table from which on it is folded
+FORMULA_WIDTH = 112  # characters in a line of a formula
+CELL_WIDTH = 46  # characters in an entry of a matrix, which may scroll
+FOLDED_FROM = 40  # tables with at least this number of rows are folded
 
 
 def equations_page(document: Document) -> str:
-    """The document as one HTML file that needs nothing else.
+    """Return the document as one self-contained HTML file.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def equations_page(document: Document) -> str:
 
 
 def block_html(block: Block) -> str:
-    """A block."""
+    """Return the markup of a block."""
     if isinstance(block, Paragraph):
         return f"<p class='prose'>{escape(block.text)}</p>"
     if isinstance(block, Display):
@@ -54,13 +54,13 @@ def block_html(block: Block) -> str:
 
 
 def formula_html(f: Formula) -> str:
-    """A formula in lines."""
+    """Return the markup of a formula in lines."""
     unit = f'<span class="unit">{escape(f.unit)}</span>' if f.unit else ""
     return f'<div class="formula">{math(aligned_lines(f, FORMULA_WIDTH), True)}{unit}</div>'
 
 
 def matrix_html(m: Matrix) -> str:
-    """A matrix with what its rows and columns belong to; entry by entry where the entries are long."""
+    """Return the markup of a matrix with labels of rows and columns; as a list if its entries are long."""
     made = matrix_cells(m)
     if not fits_width([[c] for row in made for c in row], CELL_WIDTH):
         return f'<div class="group">{"".join(formula_html(f) for f in nonzero_entries(m))}</div>'
@@ -79,12 +79,12 @@ def matrix_html(m: Matrix) -> str:
 
 
 def bracket_html(side: str) -> str:
-    """A part of the bracket on one side of a matrix: its row's."""
+    """Return a row's part of the bracket on one side of a matrix."""
     return f'<td class="bracket {side}"></td>'
 
 
 def listing_html(t: DataTable) -> str:
-    """A table; folded where it is long."""
+    """Return the markup of a table; folded if it is long."""
     head = "".join(f"<th>{escape(c)}</th>" for c in t.columns)
     rows = "".join("<tr>" + "".join(f"<td>{cell_html(c)}</td>" for c in row) + "</tr>" for row in t.rows)
     made = f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
@@ -94,7 +94,7 @@ def listing_html(t: DataTable) -> str:
 
 
 def cell_html(c: Cell) -> str:
-    """A cell of a table."""
+    """Return the markup of a table cell."""
     return math(c.latex) if isinstance(c, Tex) else escape(c)
 
 

@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from ..results.result import Result
 
 
-FONT_SIZE = 7.5  # of the letters [pt]
+FONT_SIZE = 7.5  # size of the letters [pt]
 LETTER_WIDTH = 0.56 * FONT_SIZE  # their mean width
 LANE_HEIGHT = 1.3 * FONT_SIZE
 MAX_LANES = 5
-NAME_GAP = 3.0  # between names, and below them [pt]
-MAX_NAME_LETTERS = 40  # letters of a name
-AXES_WIDTH_PART = 0.72  # part of the picture's width that axes with a legend beside them have
+NAME_GAP = 3.0  # spacing between names, and below them [pt]
+MAX_NAME_LETTERS = 40  # characters of a name
+AXES_WIDTH_PART = 0.72  # relative width of axes with a legend beside them
 NAME_LINE_WIDTH = 0.8
 
 
 class PlacedName(NamedTuple):
-    """A name in a lane, to the right of its mark or to the left."""
+    """A name in a row of labels, to the right or left of its mark."""
 
     mark: Mark
     lane: int
@@ -34,7 +34,7 @@ class PlacedName(NamedTuple):
 
 
 def draw_names(ax: Axes, named: Sequence[Mark], color: str) -> None:
-    """Write names above the axes, each with a line up from its mark; a title of the axes goes above them."""
+    """Write names above the axes, each with a line up from its mark; the title of the axes is moved above them."""
     low, high = ax.get_xlim()
     width = AXES_WIDTH_PART * 72.0 * ax.figure.get_figwidth()  # type: ignore[union-attr]
     found = place_names(named, [width * (m.t - low) / (high - low) for m in named], width)
@@ -69,14 +69,15 @@ def draw_names(ax: Axes, named: Sequence[Mark], color: str) -> None:
 
 
 def shortened_name(text: str) -> str:
-    """A name of a length that can be written."""
+    """Return a name shortened to the permitted length."""
     return text if len(text) <= MAX_NAME_LETTERS else f"{text[: MAX_NAME_LETTERS - 1]}…"
 
 
 def place_names(named: Sequence[Mark], at: Sequence[float], width: float) -> list[PlacedName]:
-    """Lanes for names of marks at places [pt] on an axis of some width: as many as fit, by their rank.
+    """Return rows for the names of marks at positions [pt] on an axis of some width: as many as fit, by rank.
 
-    Lines go up to higher lanes beside names, not through them: a name is above all whose marks are below it.
+    Lines to higher rows pass beside names, not through them: a name is above all names whose
+    marks are under it.
     """
     kept: list[tuple[Mark, float, bool, tuple[float, float]]] = []
     lanes: list[int] = []
@@ -91,7 +92,7 @@ def place_names(named: Sequence[Mark], at: Sequence[float], width: float) -> lis
 
 
 def _assign_lanes(at: Sequence[float], spans: Sequence[tuple[float, float]]) -> list[int] | None:
-    """The lowest lanes for names over these spans; None if there are not enough."""
+    """Return the lowest rows for names with these spans; None if there are not enough."""
     out = [0] * len(at)
     pairs = list(permutations(range(len(at)), 2))
     for _ in range(MAX_LANES * len(at)):
@@ -107,7 +108,7 @@ def _assign_lanes(at: Sequence[float], spans: Sequence[tuple[float, float]]) -> 
 def _must_be_above(
     at: Sequence[float], spans: Sequence[tuple[float, float]], lanes: Sequence[int], j: int, k: int
 ) -> bool:
-    """Whether name j has to be above name k: the mark of k is below it, or else they overlap and j comes first."""
+    """Return whether name j has to be above name k: the mark of k is under j, or they overlap and j is first."""
     (a, b), (c, d) = spans[j], spans[k]
     if a - NAME_GAP < at[k] < b + NAME_GAP and at[k] != at[j]:
         return True
@@ -115,20 +116,19 @@ def _must_be_above(
     return lanes[j] == lanes[k] and max(a, c) < min(b, d) and not behind and at[j] < at[k]
 
 
-MAX_MARK_LINES = 30  # lines through a panel; of more events there are short ticks at its upper edge
-RARE_COUNT = 5  # times that an event may happen to be a line among very many others
-MERGED_SPAN = 0.004  # of the time span: what happens within it is one mark
-MAX_LABEL_LETTERS = 30  # letters of a name
+MAX_MARK_LINES = 30  # largest number of lines through a panel; further events get short ticks at its upper edge
+RARE_COUNT = 5  # largest number of occurrences of an event drawn as lines among very many others
+MERGED_SPAN = 0.004  # relative to the time span: events closer than this are one mark
+MAX_LABEL_LETTERS = 30  # characters of a name
 MARK_DASHES = (0, (3, 2))
 MARK_COLOR = "#96448a"
-MAX_MARK_NAMES = 3  # names of one mark
+MAX_MARK_NAMES = 3  # number of names of one mark
 
 
 def event_marks(result: Result) -> tuple[Mark, ...]:
-    """What happened at instants, as marks on a time axis: what is close together is one.
+    """Return events as marks on a time axis; close events share a mark.
 
-    Where there are very many, only what happens seldom is a line. Each name is told at the first of its lines, with how
-    often it happens in all.
+    If there are very many, only rare events are lines. Each name is written at its first line, with its total count.
     """
     if not len(result.t) or not len(result.events):
         return ()
@@ -157,7 +157,7 @@ def event_marks(result: Result) -> tuple[Mark, ...]:
 
 
 def event_names_text(names: Sequence[str]) -> str:
-    """Names of what happened, each once, and how often."""
+    """Return the names of events, each once, with counts."""
     counts = {name: names.count(name) for name in dict.fromkeys(names)}
     texts = [f"{name} ×{n}" if n > 1 else name for name, n in counts.items()]
     more = f", {len(texts) - MAX_MARK_NAMES} more" if len(texts) > MAX_MARK_NAMES else ""
@@ -165,7 +165,7 @@ def event_names_text(names: Sequence[str]) -> str:
 
 
 def draw_marks(axes: Sequence[Axes], every: Sequence[Mark]) -> None:
-    """Thin vertical lines through the panels, names above the first one where there is room; the rest are ticks."""
+    """Draw thin vertical lines through the panels, with names above the first if space permits; the rest are ticks."""
     if not every:
         return
     low, high = axes[0].get_xlim()

@@ -12,11 +12,11 @@ from .recording import Channel, Figure, Panel
 if TYPE_CHECKING:
     from ..results.result import Result
 
-MAX_PANEL_CURVES = 12  # curves in one panel
-MAX_HEIGHT_RATIO = 15.0  # height of a panel over the least that a curve in it varies by, at most
-FLAT_PART = 2e-3  # a curve that varies less than this part of its own size is a straight line anyway
-MIN_WORK_PART = 1e-3  # work that is less than this part of the energies need not be shown
-HIDING_PART = 0.006  # curves that are nearer than this part of the panel's height hide one another
+MAX_PANEL_CURVES = 12  # number of curves in one panel
+MAX_HEIGHT_RATIO = 15.0  # largest ratio of a panel's height to the variation of a curve in it
+FLAT_PART = 2e-3  # a curve with a smaller relative variation is a straight line anyway
+MIN_WORK_PART = 1e-3  # relative to the energies: smaller works need not be shown
+HIDING_PART = 0.006  # relative to the panel's height: closer curves hide one another
 UNIT_LABELS = {
     "J": "energy",
     "N": "force",
@@ -33,9 +33,9 @@ UNIT_LABELS = {
 
 
 def standard_figures(result: Result) -> list[Figure]:
-    """Energies with their balance, coordinates, positions, reactions, what drivers and forces do, sensors, controllers.
+    """Return energies with their balance, coordinates, positions, reactions, efforts, sensors and controllers.
 
-    Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
+    Empty figures are left out; of many parts evenly chosen ones are shown.
     """
     if not len(result.t):
         return []
@@ -45,7 +45,7 @@ def standard_figures(result: Result) -> list[Figure]:
 
 
 def energies(result: Result) -> Figure:
-    """Kinetic, potential and total energy, the work put in, and what the balance misses."""
+    """Kinetic, potential and total energy, the work done, and the error of the balance."""
     e = result.energy
     curves = [Channel(k, "J", np.asarray(getattr(e, k))) for k in ("kinetic", "potential", "total")]
     work = np.asarray(sum(e.work.values(), np.zeros(len(result.t))))
@@ -59,7 +59,7 @@ def energies(result: Result) -> Figure:
 
 
 def coordinates(result: Result) -> Figure | None:
-    """Relative coordinates of the joints; those that hardly vary beside others in a panel of their own."""
+    """Relative coordinates of the joints; those with small variation in a panel of their own."""
     every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
     units = dict.fromkeys(unit for _, _, unit in every)
     chosen = [c for unit in units for c in evenly_chosen([c for c in every if c[2] == unit])]
@@ -85,7 +85,7 @@ def positions(result: Result) -> Figure | None:
 
 
 def reactions(result: Result) -> Figure | None:
-    """Sizes of the joints' reaction forces, and of their torques where they carry any."""
+    """Magnitudes of the joints' reaction forces, and of their torques if there are any."""
     sizes: dict[str, list[Channel]] = {"N": [], "N*m": []}
     joints = evenly_chosen(result.model.joints)
     for e in joints:
@@ -95,7 +95,7 @@ def reactions(result: Result) -> Figure | None:
             a = np.asarray(getattr(view, what))
             sizes[unit].append(Channel(name, unit, np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))))
     force, torque = (max((float(np.nanmax(c.values, initial=0.0)) for c in x), default=0.0) for x in sizes.values())
-    least = 1e-9 * max(torque, force * result.values.length)  # below, rounding errors
+    least = 1e-9 * max(torque, force * result.values.length)  # smaller values are rounding errors
     sizes["N*m"] = [c for c in sizes["N*m"] if np.nanmax(c.values, initial=0.0) > least]
     parts = [Panel(f"|{UNIT_LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
     if not parts:
@@ -107,7 +107,7 @@ def reactions(result: Result) -> Figure | None:
 
 
 def actuation(result: Result) -> Figure | None:
-    """What drivers need, and what couplings and force elements do."""
+    """Efforts of drivers, couplings and force elements."""
     curves: list[Channel] = []
     for e in (*result.model.drivers, *result.model.couplings, *result.model.forces, *result.model.limits):
         channels = result[e.name].channels()
@@ -117,7 +117,7 @@ def actuation(result: Result) -> Figure | None:
 
 
 def sensors(result: Result) -> Figure | None:
-    """What sensors measure."""
+    """Values of sensors."""
     curves = []
     for e in result.model.sensors:
         channels = result[e.name].channels()
@@ -129,7 +129,7 @@ def sensors(result: Result) -> Figure | None:
 
 
 def controllers(result: Result) -> Figure | None:
-    """What controllers say; before it what they are to follow, and what follows it."""
+    """Outputs of controllers, after their references and responses."""
     every = result.model.controllers
     chosen, parts = evenly_chosen(every), []
 
@@ -145,7 +145,7 @@ def controllers(result: Result) -> Figure | None:
 
 
 def panels_by_unit(curves: Sequence[Channel], most: int = MAX_PANEL_CURVES) -> list[Panel]:
-    """One panel for each unit; its first curves where there are too many."""
+    """Return one panel for each unit, with its first curves if there are too many."""
     groups: dict[str, list[Channel]] = {}
     for c in curves:
         groups.setdefault(c.unit, []).append(c)
@@ -155,14 +155,14 @@ def panels_by_unit(curves: Sequence[Channel], most: int = MAX_PANEL_CURVES) -> l
 
 
 def panel_label(curves: Sequence[Channel]) -> str:
-    """What an axis shows: what all its curves are called, else what their unit measures."""
+    """Return an axis label: the common name of all its curves, else the quantity of their unit."""
     names = {c.name.rpartition(".")[2] for c in curves}
     own = names.pop() if len(names) == 1 and all("." in c.name for c in curves) else ""
     return own if len(own) > 2 else UNIT_LABELS.get(curves[0].unit, own)
 
 
 def split_panel(panel: Panel) -> list[Panel]:
-    """The panel; or several, where a curve would be all but a straight line beside others."""
+    """Return the panel, or several if a curve would look constant beside others."""
     groups: list[list[Channel]] = []
     for c in panel.curves:
         home = next((g for g in groups if _comparable([*g, c])), None)
@@ -174,7 +174,7 @@ def split_panel(panel: Panel) -> list[Panel]:
 
 
 def _comparable(curves: Sequence[Channel]) -> bool:
-    """Whether none of these curves varies much less than the panel that holds them all is high."""
+    """Return whether no curve varies much less than the height of the common panel."""
     finite = [v for c in curves if len(v := c.values[np.isfinite(c.values)])]
     if not finite:
         return True
@@ -185,7 +185,7 @@ def _comparable(curves: Sequence[Channel]) -> bool:
 
 
 def hidden_counts(curves: Sequence[np.ndarray]) -> list[int]:
-    """For each curve, how many earlier ones it would hide: drawn dashed it lets them show."""
+    """Return for each curve how many earlier ones it would hide; it is drawn dashed to show them."""
     finite = [v[np.isfinite(v)] for v in curves]
     values = np.concatenate([*finite, np.zeros(0)])
     if not len(values):
@@ -199,13 +199,13 @@ def hidden_counts(curves: Sequence[np.ndarray]) -> list[int]:
 
 
 def moving_bodies(result: Result) -> list[str]:
-    """Names of all bodies; where there are sets only, those of their members."""
+    """Names of all bodies; if there are sets only, those of their members."""
     names = [b.name for b in result.model.bodies]
     return names or [f"{name}[{k}]" for name, own in result.bulk.items() for k in evenly_chosen(range(len(own)))]
 
 
 def contacts(result: Result) -> Figure | None:
-    """How many contacts there are and what they lose, the deepest overlap, and the largest normal force."""
+    """Number of contacts, dissipated power, deepest overlap, and largest normal force."""
     c = result.contacts
     if c is None or not len(c):
         return None
@@ -230,12 +230,12 @@ def centre(result: Result, name: str) -> np.ndarray:
 
 
 def count_note(shown: int, there: int, what: str) -> str:
-    """What to say where not all are shown."""
+    """Return a note if not all are shown."""
     return f"{shown} of {there} {what}" if shown < there else ""
 
 
 def evenly_chosen(parts: Sequence[Any], most: int = MAX_PANEL_CURVES) -> list[Any]:
-    """Evenly chosen parts, first and last among them."""
+    """Return evenly chosen parts, including first and last."""
     if len(parts) <= most:
         return list(parts)
     return [parts[i] for i in np.linspace(0, len(parts) - 1, most).round().astype(int)]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..results.inverse_dynamics import InverseDynamics
 
 
-MAX_PAIRS = 8  # pairs that are drawn where none are named
+MAX_PAIRS = 8  # number of pairs drawn if none are named
 
 
 def plot_contacts(
@@ -34,14 +34,15 @@ def plot_contacts(
     ----------
     contacts : Contacts
     pairs : pairs of names
-        Who and whom, as `Contacts.between` has them; if none are named, those of the largest forces, eight at most.
+        Acting and affected side, as for `Contacts.between`; if none are named, up to eight pairs with the largest
+        forces.
     path : path, optional
         Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
 
     Raises
     ------
     ModelError
-        If nothing touched and no pair is named, a name is unknown, or the file cannot be written.
+        If there was no contact and no pair is named, a name is unknown, or the file cannot be written.
     """
     if any(isinstance(p, str) or len(p) != 2 for p in pairs):
         raise ModelError("contacts: name pairs of two names, such as plot(('ball', 'ground'), ('ball', 'wall'))")
@@ -76,7 +77,7 @@ def plot_convergence(histories: Sequence[Convergence], path: str | os.PathLike |
     Raises
     ------
     ModelError
-        If they are over different things, or the file cannot be written.
+        If they are over different quantities, or the file cannot be written.
     """
     over = {h.over for h in histories}
     if len(over) != 1:
@@ -96,13 +97,13 @@ def plot_convergence(histories: Sequence[Convergence], path: str | os.PathLike |
         return finish_figure(drawing, path)
 
 
-ROUNDING_PART = 1e-9  # reactions below this part of the largest are rounding
+ROUNDING_PART = 1e-9  # reactions below this part of the largest are rounding errors
 MAX_NAMED_JOINTS = 8
-NOTE_WIDTH = 120  # letters of a line
+NOTE_WIDTH = 120  # characters per line
 
 
 def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) -> Any:
-    """Draw what drives do, and the components of reactions that the motion determines.
+    """Draw efforts of drives, and the determined components of reactions.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) 
 
 
 def _undetermined_note(curves: dict[str, tuple[str, np.ndarray]]) -> str:
-    """What is undetermined, joint by joint."""
+    """Return a note on undetermined components, joint by joint."""
     free: dict[str, list[str]] = {}
     for name, (_, values) in curves.items():
         if np.isnan(values).any():
@@ -156,6 +157,6 @@ def _undetermined_note(curves: dict[str, tuple[str, np.ndarray]]) -> str:
 
 
 def _force_scale(found: InverseDynamics) -> float:
-    """The largest force of a joint, which says what is no more than rounding."""
+    """Return the largest force of a joint, the reference for rounding errors."""
     forces = (found.reaction(j.name).one[:, :3] for j in found.result.model.joints)
     return max((float(np.abs(f).max(initial=0.0)) for f in forces), default=0.0)

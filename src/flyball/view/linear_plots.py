@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from ..results.modes import Modes
 
 
-BODE_POINTS, LARGE_MODEL_POINTS = 500, 150  # of a large model
-LARGE_MODEL_POLES = 10  # poles of a large model that are shown
-MAX_DECADES = 8.0  # at most
-ORIGIN_PART = 1e-7  # of the largest pole or zero: below, it is at the origin
-CANCELLATION_PART = 1e-6  # a pole and a zero nearer than this, of their distance from the origin, cancel
-MIN_DAMPING_RATIO = 1e-4  # damping ratio of resonances: sharper ones are drawn as if they had this
+BODE_POINTS, LARGE_MODEL_POINTS = 500, 150  # number of frequencies for a large model
+LARGE_MODEL_POLES = 10  # number of poles of a large model that are shown
+MAX_DECADES = 8.0  # largest number of frequencies
+ORIGIN_PART = 1e-7  # relative to the largest pole or zero: smaller ones are at the origin
+CANCELLATION_PART = 1e-6  # relative distance of a pole and a zero that cancel
+MIN_DAMPING_RATIO = 1e-4  # damping ratio of resonances: sharper ones are drawn with this value
 
 
 def bode_frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndarray:
-    """Angular frequencies [rad/s], a decade beyond poles and zeros of (input, output) pairs, closer at resonances."""
+    """Angular frequencies [rad/s], a decade beyond poles and zeros of (input, output) pairs, denser at resonances."""
     if model.large:
         roots = model.descriptor.nearest(LARGE_MODEL_POLES)
     else:
@@ -56,16 +56,16 @@ def bode_frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np
     resonant = roots[(roots.imag > 0.0) & (np.abs(roots.real) < 0.5 * np.abs(roots))]
     u = np.sinh(
         np.linspace(-6.0, 6.0, 14 if model.large else 42)
-    )  # even in number: the peak itself of an undamped one is infinite
+    )  # even number: the peak itself of an undamped resonance is infinite
     near = [abs(r) * (1.0 + max(abs(r.real) / abs(r), MIN_DAMPING_RATIO) * u) for r in resonant]
     tops = [np.array([r.imag]) for r in resonant if abs(r.real) > MIN_DAMPING_RATIO * abs(r)]
     every = np.concatenate([even, *near, *tops])
-    most = np.inf if model.period is None else np.pi / model.period  # beyond it nothing new is seen
+    most = np.inf if model.period is None else np.pi / model.period  # no further features beyond it
     return np.unique(np.minimum(every[(every >= even[0]) & (every <= even[-1])], most))
 
 
 def zeros_and_poles(model: LinearModel, input: str, output: str) -> tuple[np.ndarray, np.ndarray]:
-    """Zeros and poles [1/s] of a transfer function that do not cancel; none where the output does not follow."""
+    """Return zeros and poles [1/s] of a transfer function that do not cancel; none if the output does not respond."""
     found, all_poles, _ = model.transfer(input, output)
     zeros, poles = list(found[np.isfinite(found)]), list(all_poles)
     largest = max(map(abs, poles), default=0.0)
@@ -79,11 +79,11 @@ def zeros_and_poles(model: LinearModel, input: str, output: str) -> tuple[np.nda
 
 
 def phase(model: LinearModel, input: str, output: str, omega: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Phase [rad] of a response, without jumps; it begins between -pi and pi.
+    """Return the phase [rad] of a response, without jumps, starting between -pi and pi.
 
-    Every pole and zero contributes an angle that changes evenly with frequency, so that turns are known however sharp
-    a resonance is. Roots on the imaginary axis count as damped. Of a large model they are not known, and the phase
-    changes by less than half a turn from one frequency to the next.
+    Every pole and zero contributes an angle that changes monotonically with frequency, so that full turns are known for
+    any resonance. Roots on the imaginary axis are treated as damped. Those of a large model are unknown; its phase is
+    assumed to change by less than half a turn from one frequency to the next.
     """
     if model.large:
         return _unwrapped_phase(response)
@@ -98,20 +98,21 @@ def phase(model: LinearModel, input: str, output: str, omega: np.ndarray, respon
     own = np.where(np.isfinite(response) & (np.abs(response) > 0.0), np.angle(response), np.nan)
     if not np.isfinite(own).any():
         return own
-    offset = np.nanmedian(np.angle(np.exp(1j * (own - turned))))  # the gain's sign
+    offset = np.nanmedian(np.angle(np.exp(1j * (own - turned))))  # sign of the gain
     out = own + 2.0 * np.pi * np.round((turned + offset - own) / (2.0 * np.pi))
     return _principal_start(out)
 
 
 def _principal_start(phase: np.ndarray) -> np.ndarray:
-    """The same phase, but for whole turns, which begins between -pi and pi."""
+    """Return the phase shifted by full turns to start between -pi and pi."""
     first = phase[np.isfinite(phase)][:1]
     return phase - 2.0 * np.pi * np.ceil((first - np.pi * (1.0 - 1e-6)) / (2.0 * np.pi)) if len(first) else phase
 
 
 def _unwrapped_phase(response: np.ndarray) -> np.ndarray:
-    """Phase from one frequency to the next; by half a turn it falls at a pole, where the response is large, and rises
-    at a zero.
+    """Return the phase unwrapped from one frequency to the next.
+
+    A change by half a turn is a decrease at a pole, where the response is large, and an increase at a zero.
     """
     known = np.flatnonzero(np.isfinite(response) & (np.abs(response) > 0.0))
     size, turn = np.log(np.abs(response[known])), np.angle(response[known])
@@ -124,13 +125,13 @@ def _unwrapped_phase(response: np.ndarray) -> np.ndarray:
     return _principal_start(out)
 
 
-STABLE_COLOR = "#eaf4ee"  # the half plane of what dies away
+STABLE_COLOR = "#eaf4ee"  # stable half plane
 AXIS_COLOR = "#8a8a8a"
 UNSTABLE_COLOR = PALETTE[1]
 DAMPING_RATIOS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
-MAX_BRANCHES = 24  # branches or labels that can be told apart
-DISTANCE_LIMIT = 5.0  # times the usual distance from the origin: branches are followed no further than this
-ZERO_REAL_PART = 1e-6  # real parts below this part of the largest eigenvalue are none
+MAX_BRANCHES = 24  # number of distinguishable branches or labels
+DISTANCE_LIMIT = 5.0  # relative to the usual distance from the origin: branches beyond are cut off
+ZERO_REAL_PART = 1e-6  # relative to the largest eigenvalue: smaller real parts count as zero
 
 
 def bode_plot(
@@ -146,9 +147,9 @@ def bode_plot(
     ----------
     model : LinearModel
     input : str, optional
-        The only one if not named.
+        The only one if not given.
     output : str, optional
-        All of them if not named.
+        All of them if not given.
     omega : sequence of float, optional
         Angular frequencies [rad/s]; by default a decade beyond all poles and zeros, closer where they resonate.
     path : path, optional
@@ -187,7 +188,7 @@ def bode_plot(
 
 
 def _frequency_axes(upper: Axes, lower: Axes, w: np.ndarray, angles: Sequence[np.ndarray]) -> None:
-    """Frequencies along both axes, in rad/s below and in Hz above; phases in steps that divide a turn."""
+    """Set frequency axes in rad/s below and in Hz above, and phase ticks that divide a turn."""
     from matplotlib.ticker import MultipleLocator
 
     finite = np.concatenate([a[np.isfinite(a)] for a in angles])
@@ -214,7 +215,7 @@ def _frequency_axes(upper: Axes, lower: Axes, w: np.ndarray, angles: Sequence[np
 
 
 def _unit_ratio(output: str, input: str) -> str:
-    """Unit of an output over that of an input."""
+    """Return the unit of an output divided by that of an input."""
     above, below = UNIT_TEXTS.get(output, output), UNIT_TEXTS.get(input, input)
     if not above or below in ("-", ""):
         return above
@@ -231,7 +232,7 @@ def root_locus_plot(
 ) -> Any:
     """Eigenvalues over a gain or parameter as branches, from a cross to a dot; the stable half plane is shaded.
 
-    Where a branch crosses into the other half plane, the value there is written, interpolated between those given.
+    The parameter value at each crossing of the imaginary axis is labelled, interpolated between the given ones.
 
     Parameters
     ----------
@@ -269,7 +270,7 @@ def root_locus_plot(
 
 
 def _branch_line(branch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A branch's line; where it comes to or leaves the real axis it does so at a right angle."""
+    """Return a branch's line; it meets the real axis at a right angle."""
     on_axis = np.abs(branch.imag) <= 1e-9 * np.abs(branch).max(initial=0.0)
     k = np.flatnonzero(on_axis[1:] != on_axis[:-1])
     foot = np.where(on_axis[k], branch.real[k + 1], branch.real[k])
@@ -277,7 +278,7 @@ def _branch_line(branch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _limit_to_branches(ax: Axes, roots: np.ndarray) -> None:
-    """Limits that show where the branches are, without those parts that run off to infinity."""
+    """Return limits that show the branches, without parts that go to infinity."""
     every = roots[np.isfinite(roots)]
     usual = DISTANCE_LIMIT * float(np.median(np.abs(every))) if every.size else 1.0
     ends = np.abs(roots[[0, -1]]) if len(roots) else np.zeros(0)
@@ -289,7 +290,7 @@ def _limit_to_branches(ax: Axes, roots: np.ndarray) -> None:
 
 
 def limits_around(ax: Axes, points: np.ndarray) -> None:
-    """Limits around points and the imaginary axis; lines have some width even where all lie on one of them."""
+    """Return limits around points and the imaginary axis, with a finite width if all lie on a line."""
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     wide = float(np.abs(points.real).max(initial=0.0))
     wide = wide if wide > 1e-3 * size else 0.1 * size
@@ -302,7 +303,7 @@ def limits_around(ax: Axes, points: np.ndarray) -> None:
 
 
 def plane(ax: Axes) -> None:
-    """The complex plane's axes, and the half of it where motions die away."""
+    """Draw the complex plane's axes, and shade the stable half plane."""
     low, high = ax.get_xlim()
     ax.axvspan(low, 0.0, color=STABLE_COLOR, zorder=0, linewidth=0)
     ax.axvline(0.0, color=AXIS_COLOR, linewidth=0.9, zorder=1)
@@ -314,9 +315,10 @@ def plane(ax: Axes) -> None:
 
 
 def _mark_crossings(ax: Axes, roots: np.ndarray, gains: np.ndarray, name: str) -> None:
-    """Where branches cross the imaginary axis: a ring, and the value there.
+    """Mark crossings of the imaginary axis by a ring and the parameter value.
 
-    Near where two meet on the real axis they move as a square root does: there it is only said between which values.
+    Near a meeting of two branches on the real axis they follow a square root: there only the bracketing values are
+    given.
     """
     least = ZERO_REAL_PART * np.abs(roots).max(initial=0.0)
     seen: list[complex] = []
@@ -382,26 +384,26 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
 
 
 def _displayed_eigenvalues(w: np.ndarray, kinds: np.ndarray) -> np.ndarray:
-    """Which eigenvalues are shown: without those that decay so fast that the others could not be told apart."""
+    """Return which eigenvalues are shown: without those so fast that the others could not be distinguished."""
     size = np.abs(w)
     slow = size[(kinds == "oscillation") | (kinds == "unstable")]
     return (kinds != "decay") | (size <= (2.0 * DISTANCE_LIMIT * slow.max() if len(slow) else np.inf))
 
 
 def _omitted_text(w: np.ndarray) -> str:
-    """Word of those that are not shown."""
+    """Return a note on those that are not shown."""
     return f"\nnot shown: {len(w)} decaying faster, at {w.real.max():.4g} to {w.real.min():.4g} 1/s" if len(w) else ""
 
 
 def _damping_rays(ax: Axes) -> None:
-    """Lines of equal damping ratio from the origin, labelled where they leave the picture; few enough to be read."""
+    """Draw lines of equal damping ratio from the origin, with labels at the border; few enough to be legible."""
     low, top = ax.get_xlim()[0], ax.get_ylim()[1]
     wide, high = -low, top
     last = None
     for ratio in DAMPING_RATIOS:
         x, y = ratio, np.sqrt(1.0 - ratio**2)
         reach = min(wide / x, high / y)
-        end = np.array([-x * reach / wide, y * reach / high])  # in parts of the quadrant
+        end = np.array([-x * reach / wide, y * reach / high])  # relative to the quadrant
         if last is not None and np.abs(end - last).max() < 0.1:
             continue
         last = end
@@ -419,7 +421,7 @@ def _damping_rays(ax: Axes) -> None:
 
 
 def _mode_numbers(ax: Axes, w: np.ndarray, kinds: np.ndarray, near: np.ndarray) -> None:
-    """The modes' numbers beside them; those in the same place share a label."""
+    """Write the modes' numbers beside them; coincident ones share a label."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     places: list[tuple[complex, list[int]]] = []
     for k in np.flatnonzero(near)[:MAX_BRANCHES].tolist():
@@ -438,7 +440,7 @@ def _mode_numbers(ax: Axes, w: np.ndarray, kinds: np.ndarray, near: np.ndarray) 
         ax.annotate(text, (value.real, value.imag), (7, 5), textcoords="offset points", fontsize=9, color=color)
 
 
-MAX_POLE_LABELS = 24  # numbers that can be read beside the marks
+MAX_POLE_LABELS = 24  # number of legible numbers beside the marks
 
 
 def pole_zero_plot(model: LinearModel, path: str | os.PathLike | None = None) -> Any:

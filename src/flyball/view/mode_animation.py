@@ -19,31 +19,30 @@ if TYPE_CHECKING:
     from ..results.modes import Modes
 
 DEFAULT_MODES = 12
-SHOWN_PERIOD = 2.0  # one period of any mode takes this long on the page [s]
+SHOWN_PERIOD = 2.0  # duration of one period of any mode on the page [s]
 FINE_SAMPLES, COARSE_SAMPLES = 41, 21  # samples of a period
-COARSE_FROM = 2000  # bodies times modes from which it is sampled coarsely
-MIN_SHAPE_PART = 0.02  # parts of a shape below this one of its largest are not listed
-MAX_SHAPE_PARTS = 12  # parts of a shape that are listed
+COARSE_FROM = 2000  # number of bodies times modes from which sampling is coarser
+MIN_SHAPE_PART = 0.02  # relative to the largest part of a shape: smaller ones are not listed
+MAX_SHAPE_PARTS = 12  # number of listed parts of a shape
 
 
 def modes_page(
     modes: Modes, *, count: int = DEFAULT_MODES, amplitude: float = 0.1, show: Collection[str] = ("grid",)
 ) -> str:
-    """Write modes as one web page in which they move; it needs nothing else and opens offline in any browser.
+    """Return one self-contained web page with animated modes, which opens offline in any browser.
 
-    Every mode is shown over one period, which takes 2 s at any frequency, without damping; modes that do not
-    oscillate go out and back. ``#mode=2`` after the page's address opens it at mode 2.
+    Every mode is shown over one period, which takes 2 s at any frequency, without damping; modes that do not oscillate
+    are shown going out and back. ``#mode=2`` after the page's address opens it at mode 2.
 
     Parameters
     ----------
     modes : Modes
     count : int
-        How many of them, slowest first; rigid ones only where the others are fewer.
+        Number of modes, slowest first; rigid ones only if there are fewer others.
     amplitude : float
-        Largest part of a swing: radians, or parts of the mechanism's length. The page can make it up to three times
-        as large.
+        Largest amplitude: radians, or relative to the mechanism's length. The page can increase it up to three times.
     show : names
-        What is switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
+        Displays switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
 
     Raises
     ------
@@ -68,18 +67,18 @@ def modes_page(
 
 
 def _chosen_modes(modes: Modes, count: int) -> list[int]:
-    """The slowest modes; rigid ones where there is room left."""
+    """Return the slowest modes, then rigid ones if there are fewer."""
     order = sorted(range(len(modes)), key=lambda k: (modes.kinds[k] == "rigid", k))
     return sorted(order[:count])
 
 
 def _mode_start(n: int) -> float:
-    """Time at which the n-th mode shown begins; the first period is that of rest, and between two there is a pause."""
+    """Return the start time of the n-th mode; the first period is at rest, and there are pauses between modes."""
     return SHOWN_PERIOD * (2 * n + 1)
 
 
 def _consecutive_modes(modes: Modes, chosen: Sequence[int], amplitude: float, samples: int) -> Result:
-    """All modes as one motion: at rest, then a period of each."""
+    """Return all modes as one motion: at rest, then a period of each."""
     x = modes.point
     parts = [x, *(modes.motion(k, amplitude, samples) for k in chosen)]
     t = np.concatenate([[0.0], *(_mode_start(n) + np.linspace(0.0, SHOWN_PERIOD, samples) for n in range(len(chosen)))])
@@ -105,7 +104,7 @@ def _recorded_mode(modes: Modes, k: int, n: int) -> RecordedMode:
 
 
 def _mode_notes(modes: Modes, number: int) -> dict[str, str]:
-    """The summary beside the picture."""
+    """Return the summary beside the picture."""
     grow = [str(k) for k, kind in enumerate(modes.kinds) if kind == "unstable"]
     some = f": {', '.join(grow[:12])}{' ...' if len(grow) > 12 else ''}"
     out = {

@@ -15,12 +15,12 @@ from ..results.phases import Moment, Phase, Phases, event_energies
 if TYPE_CHECKING:
     from ..results.result import Result
 
-ROUNDING_PART = 1e-12  # of a state, or of the time span
-MAX_INSTANTS = 400  # instants; of more, jumps are too near to each other to be told apart
+ROUNDING_PART = 1e-12  # relative tolerance for a state, or for the time span
+MAX_INSTANTS = 400  # number of instants; more jumps could not be distinguished
 
 
 class _EventState(NamedTuple):
-    """An instant between two stretches: the number of the first, and the states on both sides."""
+    """An instant between two phases: the index of the first, and the states on both sides."""
 
     stretch: int
     t: float
@@ -31,8 +31,8 @@ class _EventState(NamedTuple):
 class MotionWithEvents(NamedTuple):
     """A motion with two more times at each event.
 
-    ``near`` is for each of its times the output time of the motion that it was made of: itself, or the last before and
-    the first after an event. ``more`` says which times are more.
+    ``near`` is for each of its times the index of the original output time: itself, or the last before and the first
+    after an event. ``more`` marks the additional times.
     """
 
     motion: Result
@@ -41,12 +41,12 @@ class MotionWithEvents(NamedTuple):
 
 
 def motion_with_event_states(result: Result) -> Result:
-    """The motion with two more times at each event; itself where there are none."""
+    """Return the motion with two additional times at each event; itself if there are none."""
     return add_event_states(result).motion
 
 
 def add_event_states(result: Result) -> MotionWithEvents:
-    """The same, and where its times come from."""
+    """Return the same, and the origin of its times."""
     edges, stretches = _event_states(result), result.phases
     n = len(result.t)
     if not edges or stretches is None:
@@ -61,7 +61,7 @@ def add_event_states(result: Result) -> MotionWithEvents:
 
 
 def _extended_motion(result: Result, phases: Phases, edges: list[_EventState], at: np.ndarray) -> Result:
-    """The motion with the states of edges before the rows ``at``."""
+    """Return the motion with the states of ``edges`` inserted before the rows ``at``."""
     y = np.array([x for e in edges for x in (e.before, e.after)])
     s = result.values.structure
     q, v, z = np.split(y, [s.nq, s.nq + s.nv], axis=1)
@@ -80,7 +80,7 @@ def _extended_motion(result: Result, phases: Phases, edges: list[_EventState], a
 
 
 def _event_states(result: Result) -> list[_EventState]:
-    """Instants within the motion whose states and stretches are known."""
+    """Return the instants within the motion whose states and phases are known."""
     if result.phases is None or result.bulk or len(result.t) < 2:
         return []
     inside = [h for h in result.events if result.t[0] < h.t < result.t[-1] and _has_moments(h)]
@@ -107,7 +107,7 @@ def _event_states(result: Result) -> list[_EventState]:
 
 
 def _phase_ending_in(every: Sequence[Phase], y: np.ndarray) -> int | None:
-    """The stretch that ended in a state; an instant may be the last place of a time after it."""
+    """Return the phase that ended in a state; its end may be rounded to the same time."""
     near = ROUNDING_PART * np.abs(y).max(initial=0.0)
     for most in (0.0, near):
         found = next((j for j, x in enumerate(every) if np.abs(x.end - y).max(initial=0.0) <= most), None)
@@ -117,7 +117,7 @@ def _phase_ending_in(every: Sequence[Phase], y: np.ndarray) -> int | None:
 
 
 def _same_modes(a: Phase, b: Phase) -> bool:
-    """Whether the same holds in both, so that nothing jumps between them but velocities."""
+    """Return whether the modes are equal, so that only velocities can jump."""
     ways = np.array_equal(a.ways[:, -1:], b.ways[:, :1])
     return a.values is b.values and ways and np.array_equal(a.switch, b.switch, equal_nan=True)
 
@@ -127,7 +127,7 @@ def _has_moments(h: Any) -> bool:
 
 
 def _extended_phases(phases: Phases, edges: Iterable[_EventState]) -> Phases:
-    """The stretches with one more time at each side of an edge."""
+    """Return the phases with an additional time at each side of an event."""
     first, last = np.zeros((2, len(phases.all)), int)
     for e in edges:
         last[e.stretch], first[e.stretch + 1] = 1, 1
@@ -137,7 +137,7 @@ def _extended_phases(phases: Phases, edges: Iterable[_EventState]) -> Phases:
 
 
 def _extended_phase(x: Phase, first: int, last: int) -> Phase:
-    """A stretch with more times before and after its own."""
+    """Return a phase with additional times before and after its own."""
     ways = x.sigma
     if ways.ndim == 2 and ways.shape[1] > 1:
         ways = np.concatenate([ways[:, :1]] * first + [ways] + [ways[:, -1:]] * last, axis=1)

@@ -4,10 +4,10 @@ The payload is a JSON header, then one block of numbers. Poses, points and curve
 corners of triangles integers. Arrays lie column by column with their bytes shuffled (all first bytes, then all
 second bytes, ...), which makes smooth motions much smaller once compressed. Equal arrays are stored once.
 
-Poses of many bodies and contact forces are small whole numbers. Positions are steps of a grid; orientations are
-rotation vectors, steps of 2 pi / 65535; forces are square roots of what they are of the largest one. Poses are
-written as differences from the time before, modulo the width of the integer: a body at rest costs nothing once
-compressed. The page undoes it: `packed.js`, `touches.js`.
+Poses of sets of bodies and contact forces are stored as small integers. Positions are steps of a grid; orientations are
+rotation vectors in steps of 2 pi / 65535; forces are square roots of their fractions of the largest one. Poses are
+stored as differences from the time before, modulo the width of the integer: a body at rest needs almost no space once
+compressed. The page decodes them in `packed.js` and `touches.js`.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from .recording import Channel, RecordedContacts, RecordedSet, Recording, Shape,
 
 
 def fill_template(template: str, parts: dict[str, str]) -> str:
-    """The template with its marks replaced, once: what is put in is not looked at again."""
+    """Return the template with its marks replaced in one pass: inserted text is not searched again."""
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts.get(match[1], match[0]), template)
 
 
 @cache
 def static(name: str) -> str:
-    """The text of a file in ``static/``."""
+    """Return the text of a file in ``static/``."""
     return files(__package__).joinpath("static", name).read_text(encoding="utf-8")
 
 
-POSITION_STEP = 1e-3  # step of positions over the size of a body: less than a pixel
+POSITION_STEP = 1e-3  # step of positions relative to the size of a body: less than a pixel
 RANGE_16_BIT, RANGE_32_BIT = 2**16, 2**32
-NOT_DRAWN = 0  # in x: this body is not drawn
+NOT_DRAWN = 0  # marker in x: this body is not drawn
 
 
 def pack_positions(p: np.ndarray, size: float) -> tuple[np.ndarray, dict[str, object]]:
-    """Differences of positions (n, m, 3) on a grid that is fine for bodies of a size, and what undoes them.
+    """Encode positions (n, m, 3) as differences on a grid that is fine relative to the bodies' size.
 
-    Returns whole numbers, time by time, x of all, then y, then z; and ``low``, ``step``, ``type``.
+    Return integers, time by time, x of all, then y, then z; and the decoding data ``low``, ``step``, ``type``.
     """
     gone = ~np.isfinite(p).all(axis=2)
     inside = p[~gone]
@@ -65,7 +65,7 @@ def pack_positions(p: np.ndarray, size: float) -> tuple[np.ndarray, dict[str, ob
 
 
 def pack_orientations(q: np.ndarray) -> np.ndarray:
-    """Differences of rotation vectors of quaternions (n, m, 4), as `pack_positions` has them."""
+    """Encode quaternions (n, m, 4) as differences of rotation vectors, as for `pack_positions`."""
     q = np.where(np.isfinite(q).all(axis=2)[:, :, None], q, (1.0, 0.0, 0.0, 0.0))
     q = q * np.where(q[:, :, :1] < 0.0, -1.0, 1.0)
     sine = np.sqrt((q[:, :, 1:] ** 2).sum(axis=2))
@@ -76,13 +76,13 @@ def pack_orientations(q: np.ndarray) -> np.ndarray:
 
 
 def _time_differences(grid: np.ndarray, width: int) -> np.ndarray:
-    """What each time adds to the one before, components of all bodies one after the other."""
+    """Return the difference of each time from the one before, components of all bodies one after the other."""
     change = np.diff(grid, axis=0, prepend=np.zeros_like(grid[:1])) % width
     return change.transpose(0, 2, 1).reshape(-1)
 
 
 def pack_forces(force: np.ndarray) -> tuple[np.ndarray, float]:
-    """Forces (k, 3) as whole numbers 0 to 65534, the square roots of their parts of the largest, and that [N]."""
+    """Encode forces (k, 3) as integers 0 to 65534, square roots of their fractions of the largest; return that too."""
     force = np.where(np.isfinite(force), force, 0.0)
     largest = float(np.abs(force).max(initial=0.0))
     part = np.sign(force) * np.sqrt(np.abs(force) / largest) if largest > 0.0 else force
@@ -93,7 +93,7 @@ ALIGNMENT = 8
 
 
 class _NumberBlock:
-    """Numbers put one after the other; each ``add`` returns where they went."""
+    """Concatenated numbers; each ``add`` returns their position."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []
@@ -190,7 +190,7 @@ def _float_list(values: Iterable[float]) -> list[float]:
 
 
 def _attached_data(thing: Any, *more: str) -> dict[str, object]:
-    """Something that rides on a body: name, body, place, and further fields."""
+    """Return an object fixed on a body: name, body, position, and further fields."""
     out: dict[str, object] = {"name": thing.name, "body": thing.body, "position": _float_list(thing.position)}
     if hasattr(thing, "quaternion"):
         out["quaternion"] = _float_list(thing.quaternion)
@@ -219,7 +219,7 @@ def _shape_data(shape: Shape, block: _NumberBlock) -> dict[str, object]:
 
 
 def _set_data(many: RecordedSet, block: _NumberBlock) -> dict[str, object]:
-    """A set of bodies: its poses as `packing` has them."""
+    """Return a set of bodies, with encoded poses."""
     size = min((half_extent(shape) for shape in many.shapes), default=1.0)
     size *= 1.0 if many.scale is None else float(np.min(many.scale, initial=np.inf))
     p, about = pack_positions(np.asarray(many.p, float), size)
@@ -231,7 +231,7 @@ def _set_data(many: RecordedSet, block: _NumberBlock) -> dict[str, object]:
 
 
 def _contact_data(contacts: RecordedContacts, block: _NumberBlock) -> dict[str, object]:
-    """Contact forces, each component by itself."""
+    """Return contact forces, each component separately."""
     point = np.asarray(contacts.point, float)
     low = point.min(axis=0, initial=np.inf) if len(point) else np.zeros(3)
     step = float((point - low).max(initial=0.0)) / 65_535 or 1.0
@@ -248,14 +248,14 @@ def _contact_data(contacts: RecordedContacts, block: _NumberBlock) -> dict[str, 
 
 
 def _sign_continuous(q: np.ndarray) -> np.ndarray:
-    """Flip signs so that neighbouring quaternions never point apart."""
+    """Flip signs of quaternions for continuity in time."""
     q = np.asarray(q, float)
     apart = np.einsum("ij,ij->i", q[1:], q[:-1]) < 0
     signs = np.where(np.cumsum(apart) % 2, -1.0, 1.0)
     return q * np.concatenate([[1.0], signs])[:, None]
 
 
-# The player's modules, each after those it imports.
+# The player's modules, each after those that it imports.
 PLAYER_MODULES = (
     "data",
     "format",
@@ -310,19 +310,19 @@ def animation_page(recording: Recording) -> str:
     Returns
     -------
     str
-        One HTML document with everything in it: it can be opened from a file, mailed, or embedded, and asks for
-        nothing else. ``#t=5`` after its address opens it paused at 5 s, ``#t=5&theme=dark`` in the dark theme too.
+        One HTML document with everything in it: it can be opened from a file, mailed, or embedded, and loads nothing
+        else. ``#t=5`` after its address opens it paused at 5 s, ``#t=5&theme=dark`` in the dark theme too.
 
     Raises
     ------
     ValueError
-        If the recording is not complete and consistent; the message names the guilty element.
+        If the recording is not complete and consistent; the message names the faulty element.
     """
     return player_page(recording, f"<h1>{html.escape(recording.name)}</h1>")
 
 
 def player_page(recording: Recording, heading: str, before: str = "", after: str = "") -> str:
-    """Put a recording and its player into a page.
+    """Return a page with a recording and its player.
 
     Parameters
     ----------
@@ -347,13 +347,13 @@ def player_page(recording: Recording, heading: str, before: str = "", after: str
 
 
 def _compressed(data: bytes) -> str:
-    # level 9 would take twice the time, for very many bodies ten times, and save less than a hundredth
+    # level 9 would take twice the time (for very many bodies ten times), and save less than 1 %
     return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
 
 
 @cache
 def _player_script() -> str:
-    """The libraries and the player as one gzipped script."""
+    """Return the libraries and the player as one gzipped script."""
     modules = "\n".join(_module_as_function(name, static(f"player/{name}.js")) for name in PLAYER_MODULES)
     head = '"use strict";\nconst THREE = LIB, uPlot = LIB.uPlot;\n'
     script = f"{static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
@@ -361,7 +361,7 @@ def _player_script() -> str:
 
 
 def _module_as_function(name: str, module: str) -> str:
-    """A module as a function of its own that returns what it exports; only its named imports are understood."""
+    """Return a module as a function that returns its exports; only its named imports are supported."""
     exported = ", ".join(re.findall(r"^export (?:class|const|function) (\w+)", module, flags=re.M))
     body = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";', r"const \1 = $\2;", module, flags=re.M)
     body = re.sub(r"^import .*;\n", "", body, flags=re.M)
@@ -382,8 +382,8 @@ def notebook_iframe(document: str, height: int = 660) -> str:
     Returns
     -------
     str
-        An ``iframe`` that carries the document in itself, so that it survives saving and exporting the notebook; the
-        document runs its scripts but reaches nothing outside the frame.
+        An ``iframe`` that contains the document, so that it is kept when the notebook is saved or exported; the
+        document runs its scripts but cannot access anything outside the frame.
     """
     style = f"width:100%;height:{int(height)}px;border:0"
     return (

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..results.result import Result
 
 PointRequest = str | tuple[str, Sequence[float]]
-LONGEST_ARROW = 0.16  # the longest arrow, as part of the picture
+LONGEST_ARROW = 0.16  # length of the longest arrow, relative to the picture
 ARROW_UNITS = {"velocity": "m/s", "acceleration": "m/s²"}
 ARROW_PLURALS = {"velocity": "velocities", "acceleration": "accelerations"}
 LINK_COLOR, FILL_COLOR = "#5a6b7b", "#9aa5b1"
@@ -42,13 +42,13 @@ def plot_path(
     ----------
     result : Result
     *points : str or (str, vector)
-        Bodies and frames, whose origin is meant, or a body and a point in its reference frame [m]. Without any, the
-        frames on moving bodies are taken; without those, the bodies.
+        Bodies and frames (their origins), or a body and a point in its reference frame [m]. Default: the frames on
+        moving bodies, or else the bodies.
     arrows : ``"velocity"``, ``"acceleration"`` or None
     number : int
-        Arrows on each path, evenly spaced in time.
+        Number of arrows on each path, evenly spaced in time.
     positions : int
-        Positions of the mechanism that are drawn, the first one darkest; 0 for none.
+        Number of drawn positions of the mechanism, the first one darkest; 0 for none.
     path : path, optional
         Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
 
@@ -74,7 +74,7 @@ def plot_path(
 
 
 def _path_figure(result: Result, tracks: dict, links: list, arrows: str | None, number: int) -> Any:
-    """One view of what lies in the plane, three of what does not."""
+    """Return one view of planar paths, three of spatial ones."""
     if result.planar:
         every = np.concatenate([t[0] for t in tracks.values()] + [x for _, shapes in links for x in shapes])
         extent = np.ptp(every[np.isfinite(every).all(axis=1)], axis=0)
@@ -95,13 +95,13 @@ def _path_figure(result: Result, tracks: dict, links: list, arrows: str | None, 
 
 
 def _default_points(result: Result) -> Sequence[PointRequest]:
-    """What is drawn if nobody says."""
+    """Return the default points."""
     frames = [f.name for f in result.model.frames if f.body != GROUND]
     return (frames or [b.name for b in result.model.bodies])[: len(PALETTE)]
 
 
 def _point_motion(result: Result, point: PointRequest) -> tuple[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Label, and position, velocity and acceleration (n, 3) of a point."""
+    """Return label, and position, velocity and acceleration (n, 3) of a point."""
     if isinstance(point, str):
         e = result.model[point]
         if not isinstance(e, (Body, Frame)):
@@ -129,7 +129,7 @@ def _point_motion(result: Result, point: PointRequest) -> tuple[str, tuple[np.nd
 def _mechanism_positions(
     result: Result, points: Sequence[PointRequest], positions: int
 ) -> list[tuple[float, list[np.ndarray]]]:
-    """Bodies at some times as the points that joints and paths have on them: [(how faint, shapes (k, 3))]."""
+    """Return bodies at some times as their points on joints and paths: [(fading, shapes (k, 3))]."""
     if positions < 1:
         return []
     places = AttachedFrames(result)
@@ -177,7 +177,7 @@ def _plot_projection(ax: Axes, across: str, tracks: dict, links: list, arrows: s
 
 
 def _plot_arrows(ax: Axes, across: tuple[int, int], tracks: dict, arrows: str, number: int) -> None:
-    """Arrows along the paths, all of one scale, which a key says."""
+    """Draw arrows along the paths, all of one scale, with a key."""
     i, j = across
     which = 1 if arrows == "velocity" else 2
     largest = _largest_vector(tracks, arrows)
@@ -202,7 +202,7 @@ def _largest_vector(tracks: dict, arrows: str) -> float:
 
 
 def _legend_title(tracks: dict, arrows: str | None) -> dict[str, Any]:
-    """Heading of the legend: how long arrows are."""
+    """Return the title of the legend, with the scale of arrows."""
     if arrows is None:
         return {}
     text = f"arrows: {arrows}, at most\n{_largest_vector(tracks, arrows):.3g} {ARROW_UNITS[arrows]}"
@@ -210,7 +210,7 @@ def _legend_title(tracks: dict, arrows: str | None) -> dict[str, Any]:
 
 
 def _outline_points(points: np.ndarray) -> np.ndarray:
-    """The corners of what points span in a plane: a polygon, or the ends of a line."""
+    """Return the corners of the convex hull of points in a plane: a polygon, or the ends of a line."""
     if len(points) < 3:
         return points
     d = points - points.mean(axis=0)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-# Okabe and Ito's palette, which people with any colour vision can tell apart, darkest first.
+# Okabe and Ito's palette, distinguishable with any colour vision, darkest first.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#4D4D4D", "#B8A800")
 DASH_STYLES: tuple[Any, ...] = ("-", (0, (4, 4)), (0, (1.5, 3)), (0, (6, 2, 1.5, 2)))
 MATPLOTLIB_STYLE: dict[str, Any] = {
@@ -52,19 +52,19 @@ MATPLOTLIB_STYLE: dict[str, Any] = {
     "svg.hashsalt": "flyball",
 }
 SUPERSCRIPTS = str.maketrans("\N{MINUS SIGN}-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-FONT_FAMILY = "DejaVu Sans"  # with Matplotlib; not every font has raised figures
+FONT_FAMILY = "DejaVu Sans"  # of Matplotlib; not every font has superscript digits
 UNIT_TEXTS = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
 LEGEND_BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
 
 
 def axis_label(name: str, unit: str) -> str:
-    """What stands at an axis: the name of a quantity and its unit."""
+    """Return an axis label: name and unit of a quantity."""
     return with_unit(name, UNIT_TEXTS.get(unit, unit))
 
 
 @contextmanager
 def plot_style() -> Iterator[None]:
-    """Our style, for the time of drawing only."""
+    """Context manager with flyball's style, for drawing only."""
     import matplotlib
     from cycler import cycler
 
@@ -74,7 +74,7 @@ def plot_style() -> Iterator[None]:
 
 
 def new_figure(height: float, width: float = 8.0) -> Drawing:
-    """A figure that belongs to no window; notebooks show it all the same."""
+    """Return a figure without a window; notebooks still display it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Drawing
 
@@ -85,7 +85,7 @@ def new_figure(height: float, width: float = 8.0) -> Drawing:
 
 
 def _png_bytes(drawing: Drawing) -> bytes:
-    """The picture as notebooks ask for it."""
+    """Return the PNG image for notebooks."""
     from io import BytesIO
 
     data = BytesIO()
@@ -94,12 +94,12 @@ def _png_bytes(drawing: Drawing) -> bytes:
 
 
 def set_title(drawing: Drawing, title: str) -> None:
-    """Put the title above a figure, at its left."""
+    """Put the title above a figure, left-aligned."""
     drawing.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
 
 
 def finish_figure(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | None:
-    """The figure, or None once it is written to ``path``, which must end in .png, .svg or .pdf."""
+    """Return the figure, or None once it is written to ``path``, which must end in .png, .svg or .pdf."""
     _use_text_numbers(drawing)
     if path is None:
         drawing.align_ylabels()
@@ -115,7 +115,7 @@ def finish_figure(drawing: Drawing, path: str | os.PathLike | None) -> Drawing |
 
 
 def _write_png(drawing: Drawing, file: BinaryIO) -> None:
-    """Place everything and draw it, each once: `savefig` draws a figure three times over to the same picture."""
+    """Lay out and draw the figure only once: `savefig` would draw the same figure three times."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -132,7 +132,7 @@ def _write_png(drawing: Drawing, file: BinaryIO) -> None:
 
 
 def _use_text_numbers(drawing: Drawing) -> None:
-    """Numbers at axes as plain text: they look the same, and nothing has to typeset them as formulas."""
+    """Use plain text for numbers at axes: they look the same, without typesetting as formulas."""
     from matplotlib.ticker import ScalarFormatter
 
     plain = _text_formatter()
@@ -148,7 +148,7 @@ def _text_formatter() -> Any:
     from matplotlib.ticker import ScalarFormatter
 
     class PlainNumbers(ScalarFormatter):
-        """Numbers as text, their common power of ten too."""
+        """Formatter of numbers as plain text, including their common power of ten."""
 
         def get_offset(self) -> str:
             text = super().get_offset()
@@ -160,7 +160,7 @@ def _text_formatter() -> Any:
 def panels_over_time(
     t: np.ndarray, parts: Sequence[Panel], ratios: Sequence[float] = (), marks: Sequence[Mark] = ()
 ) -> Drawing:
-    """Panels over the times ``t``, one below the other; high enough for their legends. Marks of events through all."""
+    """Return panels over the times ``t``, one below the other, high enough for their legends, with marks of events."""
     each = [max(2.3, 0.5 + 0.19 * len(p.curves)) for p in parts]
     heights = [h * r for h, r in zip(each, ratios or [1.0] * len(each), strict=False)]
     drawing = new_figure(0.9 + sum(heights))
@@ -189,7 +189,7 @@ def _plot_panel(ax: Axes, t: np.ndarray, panel: Panel) -> None:
 
 
 def _limit_zoom(ax: Axes, values: Iterable[np.ndarray]) -> None:
-    """Do not blow the rounding errors of a constant up to the height of the axis."""
+    """Do not enlarge the rounding errors of a constant to the height of the axis."""
     finite = np.concatenate([v[np.isfinite(v)] for v in values] or [np.zeros(0)])
     if not len(finite):
         return

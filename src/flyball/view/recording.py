@@ -1,8 +1,8 @@
 """The recording of a motion that every picture, page and player reads, and the check that it is consistent.
 
-A recording holds no physics: times, poses of bodies, lines through moving points, things that ride on bodies,
-vectors and named curves. World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one
-has z up. What rides on a body (``"ground"`` too) is given in the axes of that body, from its origin.
+A recording holds no physics: times, poses of bodies, lines through moving points, things that ride on bodies, vectors
+and named curves. World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one has z up.
+Objects fixed on a body (or on ``"ground"``) are given in the axes of that body, from its origin.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Shape:
 
 
 def half_extent(shape: Shape) -> float:
-    """About half the largest length of a shape [m]."""
+    """Return about half the largest length of a shape [m]."""
     if shape.kind == "mesh":
         return 0.5 * float(np.ptp(np.asarray(shape.vertices), axis=0).max(initial=0.0))
     if shape.kind == "plate":
@@ -65,11 +65,10 @@ class RecordedBody:
 
 @dataclass(frozen=True)
 class RecordedSet:
-    """Many bodies of one shape, named ``name[0]``, ``name[1]``, ...; drawn all at once.
+    """A set of bodies of one shape, named ``name[0]``, ``name[1]``, ...; drawn together.
 
-    ``p`` (n, m, 3) [m] and ``q`` (n, m, 4) scalar first, world from body, of m bodies; ``scale`` (m,) of each, if they
-    are of several sizes; ``colors`` of each, to choose in turn, if there are several. A body whose pose is nan is not
-    drawn.
+    ``p`` (n, m, 3) [m] and ``q`` (n, m, 4) scalar first, world from body, of m bodies; ``scale`` (m,) if their sizes
+    differ; ``colors`` are used in turn, if there are several. A body whose pose is nan is not drawn.
     """
 
     name: str
@@ -97,8 +96,8 @@ class RecordedContacts:
 class RecordedLine:
     """A line through two or more moving points, each (n, 3) [m].
 
-    ``kind``: ``spring`` (drawn as a coil), ``damper``, ``link`` (a thin rod), ``rope``, ``arrow``. ``rest`` (n,) [m]
-    is the length of an unloaded rope: where the points are closer it hangs loose.
+    ``kind``: ``spring`` (drawn as a coil), ``damper``, ``link`` (a thin rod), ``rope``, ``arrow``. ``rest`` (n,) [m] is
+    the length of an unloaded rope: if the points are closer, it is drawn slack.
     """
 
     name: str
@@ -123,15 +122,15 @@ class RecordedJoint:
     """A joint's symbol.
 
     ``kind``: ``revolute``, ``prismatic``, ``cylindrical``, ``screw``, ``spherical``, ``universal``, ``fixed``;
-    ``plane`` and ``rail`` (what a point or a body slides on), ``point``, ``wheel``, ``roller``, ``gear``, ``rack``,
+    ``plane`` and ``rail`` (on which a point or a body slides), ``point``, ``wheel``, ``roller``, ``gear``, ``rack``,
     ``knife_edge``, ``bushing``; any other kind is drawn as a plain mark.
 
-    It rides on the body named ``body`` at ``position``; ``axis`` is its axis, ``quaternion`` its frame. ``mate`` is
-    the other body, ``reach`` the stretch over which the other body's point moves along x, y, z of the symbol's frame
-    (low x, high x, low y, ... [m]). ``size`` holds what a kind needs: of ``wheel`` and ``roller`` the radius; of
-    ``gear`` radius, number of teeth, angle of a tooth from x, and 1 for teeth that point inwards; of ``rack`` the
-    distance of the pitch line from the frame's origin along y, and the distance of its teeth; of ``screw`` the lead.
-    ``scale`` makes the symbol smaller where the parts it joins are slender.
+    It is fixed on the body named ``body`` at ``position``; ``axis`` is its axis, ``quaternion`` its frame. ``mate`` is
+    the other body, ``reach`` the range of the other body's point along x, y, z of the symbol's frame (low x, high x,
+    low y, ... [m]). ``size`` contains the numbers of each kind: of ``wheel`` and ``roller`` the radius; of ``gear``
+    radius, number of teeth, angle of a tooth from x, and 1 for teeth that point inwards; of ``rack`` the distance of
+    the pitch line from the frame's origin along y, and the distance of its teeth; of ``screw`` the lead. ``scale``
+    makes the symbol smaller where the parts it joins are slender.
     """
 
     name: str
@@ -148,7 +147,7 @@ class RecordedJoint:
 
 @dataclass(frozen=True)
 class RecordedFrame:
-    """Axes that can be shown: a frame on a body; ``of`` is ``joint`` or ``frame``. Bodies' own need no mention."""
+    """Axes that can be shown: a frame on a body; ``of`` is ``joint`` or ``frame``. Bodies' own frames are omitted."""
 
     name: str
     of: str
@@ -161,8 +160,8 @@ class RecordedFrame:
 class RecordedArrow:
     """A force or moment on a body over time: ``vector`` (n, 3) [N] or [N m], world axes, acting at ``position``.
 
-    ``group``: ``reaction`` (of joints), ``element`` (springs, motors, drivers), ``load`` (given from outside).
-    ``what``: ``force`` or ``moment``.
+    ``group``: ``reaction`` (of joints), ``element`` (springs, motors, drivers), ``load`` (external). ``what``:
+    ``force`` or ``moment``.
     """
 
     name: str
@@ -175,7 +174,7 @@ class RecordedArrow:
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """The path of a point of a body is drawn."""
+    """The path of a point of a body, to be drawn."""
 
     name: str
     body: str
@@ -193,7 +192,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves of one unit that share an axis; ``label`` is what the axis says, without its unit."""
+    """Curves of one unit that share an axis; ``label`` is the axis label without the unit."""
 
     label: str
     curves: tuple[Channel, ...]
@@ -217,9 +216,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class Mark:
-    """What happened at an instant ``t`` [s], as a mark on a time axis: its text, and whether it is a line or a tick.
+    """An event at the time ``t`` [s], as a mark on a time axis: its text, and whether it is a line or a tick.
 
-    ``label`` is what is written above a line if there is room, lower ``rank`` first.
+    ``label`` is written above a line if there is space, lower ``rank`` first.
     """
 
     t: float
@@ -240,7 +239,7 @@ class PointPaths:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a picture shows, and under which title: curves over the times ``t`` (n,) [s], or paths."""
+    """Title and content of a picture: curves over the times ``t`` (n,) [s], or paths."""
 
     name: str
     title: str
@@ -251,10 +250,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class RecordedMode:
-    """A mode: one period of it, from ``begin`` to ``end`` of the recorded times, and what it is.
+    """A mode: one period of it, from ``begin`` to ``end`` of the recorded times, and its properties.
 
-    ``frequency`` [Hz] is 0 where it does not oscillate, ``omega`` [rad/s] is the size of the eigenvalue. ``shape``
-    holds for each moving coordinate its name, unit, size and phase [deg]. The first of all recorded times is at rest.
+    ``frequency`` [Hz] is 0 if it does not oscillate, ``omega`` [rad/s] is the magnitude of the eigenvalue. ``shape``
+    contains name, unit, amplitude and phase [deg] of each moving coordinate. The first of all recorded times is at
+    rest.
     """
 
     name: str
@@ -269,7 +269,7 @@ class RecordedMode:
 
 @dataclass(frozen=True)
 class Recording:
-    """One motion, ready to be shown."""
+    """One motion, ready for display."""
 
     name: str
     planar: bool
@@ -285,14 +285,14 @@ class Recording:
     arrows: tuple[RecordedArrow, ...] = ()
     frames: tuple[RecordedFrame, ...] = ()
     paths: tuple[RecordedPath, ...] = ()
-    show: tuple[str, ...] = ()  # what is switched on when the page opens: see `SHOW_OPTIONS`
+    show: tuple[str, ...] = ()  # displays switched on when the page opens: see `SHOW_OPTIONS`
     facts: dict[str, tuple[str, ...]] = field(default_factory=dict)  # part -> lines about it, for its card
-    figures: tuple[Figure, ...] = ()  # of a report
+    figures: tuple[Figure, ...] = ()  # figures of a report
     down: Vector3 = (0.0, 0.0, 0.0)  # direction of gravity, or zero
-    modes: tuple[RecordedMode, ...] = ()  # to choose from, in place of one motion
+    modes: tuple[RecordedMode, ...] = ()  # modes to choose from, in place of one motion
     sets: tuple[RecordedSet, ...] = ()
     contacts: RecordedContacts | None = None
-    marks: tuple[Mark, ...] = ()  # of what happened at instants
+    marks: tuple[Mark, ...] = ()  # marks of events
 
 
 SHOW_OPTIONS = {
@@ -307,7 +307,7 @@ SHOW_OPTIONS = {
     "names": "names of bodies",
     "grid": "ground grid",
 }
-"""What can be switched on and off in a page, and what it is."""
+"""Displays that can be switched on and off in a page, with their descriptions."""
 
 
 SHAPE_SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "cone": 2, "ellipsoid": 3, "plate": 1, "mesh": 0}
@@ -420,7 +420,7 @@ def _check_solid(body: str, shape: Shape) -> None:
 
 
 def _check_riders(recording: Recording) -> None:
-    """Whatever rides on a body names one that is there."""
+    """Check that everything fixed on a body names an existing one."""
     names = [b.name for b in recording.bodies] + [s.name for s in recording.sets]
     twice = {name for name in names if names.count(name) > 1}
     if twice:

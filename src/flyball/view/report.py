@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReportTable:
-    """Columns, rows of texts, and what stands above and below."""
+    """Columns, rows of texts, and the texts above and below."""
 
     name: str
     title: str
@@ -41,27 +41,27 @@ class ReportTable:
     rows: tuple[tuple[str, ...], ...]
     total: tuple[str, ...] = ()
     note: str = ""
-    folded: str = ""  # what is clicked to unfold it
+    folded: str = ""  # heading to click for unfolding
 
 
-MAX_WITHOUT_SUMMARY = 12  # events that are listed without a summary
-FIRST_LISTED, LAST_LISTED = 150, 50  # of many, those that are listed
+MAX_WITHOUT_SUMMARY = 12  # number of events listed without a summary
+FIRST_LISTED, LAST_LISTED = 150, 50  # number of listed events if there are more
 SWITCH_WORDS = {
     STOP: ("closed", "open"), ELASTIC: ("pressed", "open"), FRICTION: ("sticks", "slides"), RATCHET: ("holds", "free"),
     ONE_WAY: ("holds", "overruns"), LOCK: ("locked", "free"),
 }  # fmt: skip
-"""Of each kind of switch what it says while it holds, and while it does not."""
+"""Words for the active and inactive state of each kind of switch."""
 ROPE_WORDS, CONTACT_WORDS = ("taut", "slack"), ("touches", "apart")
 
 
 def events(result: Result) -> list[ReportTable]:
-    """The list of what happened; of many, how often each comes first, and the list is folded."""
+    """Return the list of events; if there are many, it is folded and preceded by their counts."""
     found = _event_list(list(result.events))
     return found if result.events.lost.any() else [_without_last_column(t) for t in found]
 
 
 def _without_last_column(t: ReportTable) -> ReportTable:
-    """A table without its last column."""
+    """Return a table without its last column."""
     return replace(t, columns=t.columns[:-1], rows=tuple(row[:-1] for row in t.rows), total=t.total[:-1])
 
 
@@ -87,13 +87,13 @@ def _event_rows(every: Sequence[EventRecord]) -> list[tuple[str, ...]]:
 
 
 def _lost_energy_text(every: Sequence[EventRecord]) -> str:
-    """What was lost, if anything."""
+    """Return the total energy lost, if any."""
     lost = sum(h.lost for h in every)
     return f"{lost:.4g}" if lost else ""
 
 
 def _event_summary(every: Sequence[EventRecord]) -> ReportTable:
-    """How often each happened, when first and last, and what it took."""
+    """Return how often each event occurred, first and last time, and lost energy."""
     groups: dict[tuple[str, str], list[EventRecord]] = {}
     for h in every:
         groups.setdefault((h.name, h.kind), []).append(h)
@@ -107,7 +107,7 @@ def _event_summary(every: Sequence[EventRecord]) -> ReportTable:
 
 
 def holding(result: Result) -> ReportTable:
-    """What may hold and let go: as it began, as it ended, and how much of the time it held."""
+    """Return the table of switching elements: initial and final state, and fraction of the time active."""
     columns = ("part", "kind", "acts on", "at the start", "at the end", "of output times", "listed above")
     title = "Stops, ropes, latches and friction"
     if result.phases is None or not len(result.t):
@@ -130,7 +130,7 @@ def holding(result: Result) -> ReportTable:
 
 
 def _active_switches(result: Any) -> np.ndarray:
-    """Whether each switch holds or presses at each output time, (ns, n)."""
+    """Return whether each switch is active at each output time, (ns, n)."""
     every = result.phases.all[0].values.structure.switches
     elastic = np.array([x.switch.kind == ELASTIC for x in every], bool)
     pressed = (result.phases.sigma != FROZEN) & (result.phases.sigma != 0.0)
@@ -144,19 +144,19 @@ def _switch_words(x: Any) -> tuple[str, str]:
 
 
 def _acts_on_text(x: Any) -> str:
-    """The coordinates that it acts along, or the bodies that it is between."""
+    """Return the coordinates along which it acts, or the bodies between which it acts."""
     if x.switch.along:
         return " and ".join(x.switch.along)
     bodies = getattr(x.element, "bodies", None) or (getattr(x.element, "body_i", ""), getattr(x.element, "body_j", ""))
     return " - ".join(b for b in bodies if b)
 
 
-MAX_TABLE_ROWS = 200  # rows of one table
-MAX_CHANGES = 4  # changes of a parameter that are told, and the last
+MAX_TABLE_ROWS = 200  # number of rows of one table
+MAX_CHANGES = 4  # number of listed parameter changes, and the last one
 
 
 def report_tables(result: Result) -> list[ReportTable]:
-    """Every table that has a row."""
+    """Return all tables that have rows."""
     made = [
         health(result),
         *events(result),
@@ -180,17 +180,17 @@ def _shortened_table(t: ReportTable) -> ReportTable:
 
 
 def fixed(x: Any) -> str:
-    """A number with four digits."""
+    """Return a number with four digits."""
     return f"{float(np.real(x)):.4g}"
 
 
 def vector_4_digits(a: Any, planar: bool) -> str:
-    """A point or vector."""
+    """Return a point or vector as text."""
     return tuple_text(np.asarray(a).real[: 2 if planar else 3])
 
 
 def health(result: Result) -> ReportTable:
-    """What the run says of itself, and with what it was made."""
+    """Return the health of the run, and versions and options."""
     options = {k: v for k, v in result.health.options.items() if v is not None}
     said = dict(result.health.lines())
     asked = {k.replace("_", " "): f"{v:.4g}" if isinstance(v, float) else str(v) for k, v in options.items()}
@@ -199,7 +199,7 @@ def health(result: Result) -> ReportTable:
 
 
 def parameters(result: Result) -> ReportTable:
-    """Named numbers as written, and what they are in SI units: at the start, and what events set them to."""
+    """Return parameters as written, and their values in SI units: initial values, and those set by events."""
     values = _parameter_values(result.model, first_piece(result).values)
     changes = _parameter_changes(result)
     rows = []
@@ -214,17 +214,17 @@ def parameters(result: Result) -> ReportTable:
 
 
 def first_piece(result: Result) -> Result:
-    """The first part of a motion, with the parameters that it began with."""
+    """Return the first part of a motion, with the initial parameters."""
     return result.pieces[0] if result.pieces else result
 
 
 def _parameter_values(model: Model, values: Values) -> dict[str, Any]:
-    """Parameters by name."""
+    """Return the parameters by name."""
     return dict(zip(model.parameters, values.system.const.tolist(), strict=False))
 
 
 def _parameter_changes(result: Result) -> dict[str, list[tuple[float, float]]]:
-    """Times at which events gave parameters other values, and these."""
+    """Return the times at which events changed parameters, and the new values."""
     out: dict[str, list[tuple[float, float]]] = {}
     for h in result.events:
         if not isinstance(h.before, Moment) or h.before.values is h.after.values:
@@ -263,12 +263,12 @@ def bodies(result: Result) -> ReportTable:
 
 
 def joints(result: Result) -> ReportTable:
-    """Where joints are at the start, what they hold, and the largest reactions they carried."""
+    """Return initial positions of joints, their constraints, and the largest reactions."""
     p, s, rows = result.planar, result.values.structure, []
     sizes = {e.name: _largest_reaction(result[e.name]) for e in result.model.joints}
     passed = {e.name: _largest_coupling_efforts(result[e.name]) for e in result.model.couplings}
     force, torque = (max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1))
-    least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # below, rounding errors
+    least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # smaller values are rounding errors
     for e in (*result.model.joints, *result.model.couplings):
         k = s.frame_at.get((e.name, "M", ""))
         at = axis = ""
@@ -289,7 +289,7 @@ def joints(result: Result) -> ReportTable:
 
 
 def _largest_reaction(view: Any) -> tuple[float, float]:
-    """The largest reaction force and torque of a joint."""
+    """Return the largest reaction force and torque of a joint."""
     sizes = []
     for a in (np.asarray(view.force), np.asarray(view.torque)):
         size = np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))
@@ -298,14 +298,14 @@ def _largest_reaction(view: Any) -> tuple[float, float]:
 
 
 def _largest_coupling_efforts(view: Any) -> tuple[str, str]:
-    """The largest force and torque that a coupling puts on its coordinates."""
+    """Return the largest force and torque of a coupling on its coordinates."""
     curves = view.channels().values()
     sizes = [[np.nanmax(np.abs(v), initial=0.0) for u, v in curves if u == unit] for unit in ("N", "N*m")]
     return tuple(fixed(max(x)) if x else "" for x in sizes)  # type: ignore[return-value]
 
 
 def controllers(result: Result) -> ReportTable:
-    """What controllers are given, as written, and between which values their first signal stayed."""
+    """Return inputs of controllers as written, and the range of their first signal."""
     rows = []
     for e in result.model.controllers:
         name = next(iter(e.signals()))
@@ -316,7 +316,7 @@ def controllers(result: Result) -> ReportTable:
 
 
 def forces(result: Result) -> ReportTable:
-    """What forces act on, their constants and laws as written, and the largest that they gave."""
+    """Return targets of forces, their constants and laws as written, and the largest values."""
     rows = []
     for e in (*result.model.forces, *result.model.limits):
         curves = result[e.name].channels()
@@ -329,7 +329,7 @@ def forces(result: Result) -> ReportTable:
 
 
 def _as_written(e: Any) -> str:
-    """An element's own numbers and laws, as the user wrote them."""
+    """Return an element's own numbers and laws, as written by the user."""
     common = {"name", "body_i", "body_j", "body", "bodies", "joint", "at", "axis"}
     own = {f.name for f in fields(e)} - common
     return "; ".join(f"{k} = {_value_text(v)}" for k, v in written_fields(e).items() if k in own)
@@ -340,7 +340,7 @@ def _value_text(value: Any) -> str:
 
 
 def drivers(result: Result) -> ReportTable:
-    """Laws of drivers, the largest effort they needed, and the work they gave."""
+    """Return laws of drivers, their largest effort, and their work."""
     rows: list[Sequence[str]] = []
     for e in result.model.drivers:
         view = result[e.name]
@@ -352,7 +352,7 @@ def drivers(result: Result) -> ReportTable:
 
 
 def sensors(result: Result) -> ReportTable:
-    """What sensors measure, and between which values it stayed."""
+    """Return measured quantities of sensors, and their ranges."""
     rows = []
     for e in result.model.sensors:
         for k, (unit, v) in result[e.name].channels().items():
@@ -361,11 +361,11 @@ def sensors(result: Result) -> ReportTable:
     return ReportTable("sensors", "Sensors", ("sensor", "kind", "of", "curve", "least", "largest", "unit"), tuple(rows))
 
 
-MAX_WARNINGS = 6  # that are told at the top
+MAX_WARNINGS = 6  # number of figures at the top
 HEADING_HEIGHT, NOTE_HEIGHT = (
     0.3,
     0.1,
-)  # heights of a figure's heading and of a note below a panel, over that of a panel
+)  # heights of a figure's heading and of a note below a panel, relative to a panel
 
 
 def report_html(result: Result, **options: Any) -> str:
@@ -408,7 +408,7 @@ def report_html(result: Result, **options: Any) -> str:
 
 
 def _thinned_figure(figure: Figure, every: np.ndarray) -> Figure:
-    """The figure at the times that are shown."""
+    """Return the figure at the displayed times."""
     panels = tuple(
         replace(p, curves=tuple(Channel(c.name, c.unit, np.asarray(c.values)[every]) for c in p.curves))
         for p in figure.panels
@@ -434,7 +434,7 @@ def _headline(result: Result) -> str:
 
 
 def _verdict_html(result: Result) -> str:
-    """One line that says whether the run came to its end, and what there is to look at twice."""
+    """Return one line: whether the run reached its end, and what to check."""
     h = result.health
     kind, text = ("good", "The run reached its end.") if h.success else ("bad", f"The run stopped: {h.message}")
     if h.ended_early:
@@ -453,12 +453,12 @@ def _verdict_html(result: Result) -> str:
 
 
 def figure_text(value: float) -> str:
-    """A figure with three digits, as a power of ten where it is small or large."""
+    """Return a figure with three digits, with an exponent if it is small or large."""
     return f"{value:.2e}" if value and not 1e-3 <= abs(value) < 1e5 else f"{value:.4g}"
 
 
 def _figure_cards(result: Result) -> str:
-    """The figures that tell at a glance whether to trust the run; exact values in ``data-value``."""
+    """Return the key figures for judging the run; exact values in ``data-value``."""
     h = result.health
     largest = float(np.nanmax(np.abs(result.energy.total), initial=0.0))
     known = not np.isnan(h.energy_drift)
@@ -484,13 +484,13 @@ def _figure_cards(result: Result) -> str:
 
 
 def _computing_time(h: Health) -> str:
-    """What was computed, and what was compiled first."""
+    """Return the computing time, and the compilation time in it."""
     compiled = f", after {h.compiling:.1f} s of compiling" if h.compiling > 0.1 * h.seconds else ""
     return f"{h.seconds - h.compiling:.2f} s of computing{compiled}"
 
 
 def _figure_columns(chosen: Sequence[Figure]) -> str:
-    """Two columns of figures that end as nearly together as can be; each figure knows its place for a single column."""
+    """Return two columns of figures of nearly equal height; each figure has its index for a single column."""
     heights = [HEADING_HEIGHT + sum(1.0 + bool(p.note) * NOTE_HEIGHT for p in f.panels) for f in chosen]
 
     def apart(right: tuple[bool, ...]) -> float:
@@ -528,7 +528,7 @@ def _table_html(table: ReportTable) -> str:
 
 
 def _model_file_html(result: Result) -> str:
-    """The model's file, to be opened and copied."""
+    """Return the model's file, for viewing and copying."""
     return (
         '<section class="listing" id="file"><h2>Model file</h2><details><summary>TOML text, as '
         '<code>flyball.load</code> reads it</summary><button type="button" data-copy="toml">Copy</button>'

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> list[Path]:
-    """Write pictures into a folder that is there, as PNG files; returns their paths.
+    """Write pictures as PNG files into an existing folder; return their paths.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> list[Path]:
 
 
 def _curves_figure(picture: Picture, figure: Figure) -> Drawing:
-    """A figure of curves over time; the balance of energies takes less room than they do."""
+    """Return a figure of curves over time; the energy balance gets a smaller panel."""
     ratios = [*([1.6] if len(figure.panels) == 2 else [1.0] * (len(figure.panels) - 1)), 0.8]
     drawing = panels_over_time(picture.t, figure.panels, ratios if figure.name == "energy" else [], picture.marks)
     if figure.note:
@@ -85,7 +85,7 @@ def _paths_figure(paths: PointPaths) -> Drawing:
 
 
 def _plot_paths(ax: Axes, points: dict[str, np.ndarray], across: str) -> None:
-    """Paths seen along one axis, to scale; a path on top of another one is dashed."""
+    """Draw paths seen along one axis, to scale; a path that coincides with another one is dashed."""
     i, j = ("xyz".index(c) for c in across)
     flat = [p[:, [i, j]].ravel() for p in points.values()]
     for k, ((name, p), under) in enumerate(zip(points.items(), hidden_counts(flat), strict=True)):
@@ -112,7 +112,7 @@ PICTURE_ORDER = (
 
 
 def standard_pictures(result: Result) -> list[Picture]:
-    """The pictures that tell most of a motion, of those that have something to show.
+    """Return the standard pictures of a motion, without empty ones.
 
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
     in the plane or from three sides), ``contacts``, ``reactions``, ``actuation``, ``sensors`` and ``controllers``.
@@ -176,5 +176,5 @@ def _curves_of(result: Result, name: str) -> list[Channel]:
 
 
 def write_standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
-    """Write the pictures that tell most of a motion into a folder that is there; returns their paths."""
+    """Write the standard pictures into an existing folder; return their paths."""
     return write_pictures(standard_pictures(result), Path(folder))

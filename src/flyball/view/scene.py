@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from ..results.result import Result
 
 
-MAX_CONTACT_ARROWS = 300_000  # contact forces in a recording, at most
-LEVEL_COSINE = 0.999  # a plane whose normal is as near to up as this is the ground that every picture has
-WALL_OPACITY = 0.15  # opacity of walls without end
-PLANE_MARGIN = 0.06  # by which a plane reaches over what moves on it, as part of the extent of that
+MAX_CONTACT_ARROWS = 300_000  # largest number of contact forces in a recording
+LEVEL_COSINE = 0.999  # a plane whose normal is this close to up is the ground plane of every picture
+WALL_OPACITY = 0.15  # opacity of infinite walls
+PLANE_MARGIN = 0.06  # margin of a plane around the bodies moving on it, relative to their extent
 
 
 def recorded_sets(result: Result, every: np.ndarray) -> tuple[RecordedSet, ...]:
-    """Sets of bodies over the recorded times."""
+    """Return sets of bodies at the recorded times."""
     out = []
     env = _parameter_values(result)
     for name, bulk in result.bulk.items():
@@ -49,7 +49,7 @@ def _parameter_values(result: Result) -> dict[str, float]:
 def ground_bodies(
     result: Result, every: np.ndarray, moving: tuple[RecordedBody | RecordedSet, ...]
 ) -> list[RecordedBody]:
-    """What stands on ground; planes without end reach as far as things move."""
+    """Return the shapes of ground; infinite planes extend as far as bodies move."""
     env, out = _parameter_values(result), []
     points = np.concatenate([np.zeros((0, 3)), *(np.asarray(b.p).reshape(-1, 3) for b in moving)])
     points = points[np.isfinite(points).all(axis=1)]
@@ -85,7 +85,7 @@ def _up_direction(result: Result) -> np.ndarray:
 
 
 def _plane_patch(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
-    """The part of a plane over which points lie, as a slab; all in the frame of what it is part of."""
+    """Return the part of a plane under the points, as a slab, in the frame of its body."""
     p, R = pose
     middle, edge = _covering_box((points - p) @ R, reach)
     thick = 0.02 * float(edge.max())
@@ -96,7 +96,7 @@ def _plane_patch(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach:
 
 
 def _ground_line(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
-    """The same in the plane: a strip behind a line."""
+    """Return the same in the plane: a strip behind a line."""
     p, n = pose[0], pose[1][:, 2]
     R = np.column_stack([np.array([n[1], -n[0], 0.0]), n, np.array([0.0, 0.0, 1.0])])
     middle, edge = _covering_box((points - p) @ R, reach)
@@ -106,7 +106,7 @@ def _ground_line(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach:
 
 
 def _covering_box(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and edges of a box around points, with room for bodies that reach so far."""
+    """Return middle and edges of a box around points, enlarged by the bodies' size."""
     if not len(points):
         return np.zeros(3), np.full(3, 4.0 * reach)
     low, high = points.min(axis=0) - 1.5 * reach, points.max(axis=0) + 1.5 * reach
@@ -114,9 +114,9 @@ def _covering_box(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndar
 
 
 def contact_arrows(result: Result, every: np.ndarray) -> tuple[RecordedContacts | None, str]:
-    """Contact forces at the recorded times, and what had to be left out, in words.
+    """Return contact forces at the recorded times, and a note on those left out.
 
-    Forces are those on what moves: of two bodies on the second one.
+    Forces act on the moving body: of two moving bodies on the second one.
     """
     contacts = result.contacts
     if contacts is None or not len(contacts):
@@ -134,7 +134,7 @@ def contact_arrows(result: Result, every: np.ndarray) -> tuple[RecordedContacts 
 
 
 def largest_contacts(rows: Contacts) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """Where times begin, and pairs, points, forces and states of the largest forces, as many as are shown."""
+    """Return the start index of each time, and pairs, points, forces and states of the largest forces displayed."""
     size = (rows.force**2).sum(axis=1)
     kept = np.zeros(len(size), bool)
     kept[np.argpartition(-size, MAX_CONTACT_ARROWS)[:MAX_CONTACT_ARROWS]] = True
@@ -142,17 +142,17 @@ def largest_contacts(rows: Contacts) -> tuple[np.ndarray, tuple[np.ndarray, ...]
     return begin, tuple(a[kept] for a in (rows.pair, rows.point, rows.force, rows.state))
 
 
-MIN_ARROW_PART = 1e-5  # arrows that never reach this part of the largest of their kind cannot be seen and are left out
-MAX_ARROW_NUMBERS = 600_000  # in the arrows of a recording, at most
+MIN_ARROW_PART = 1e-5  # relative to the largest of their kind: smaller arrows are invisible and left out
+MAX_ARROW_NUMBERS = 600_000  # largest number of vectors in the arrows of a recording
 
 
 def force_arrows(
     result: Result, places: AttachedFrames, every: np.ndarray, instead: np.ndarray
 ) -> tuple[RecordedArrow, ...]:
-    """Every arrow that can be seen; of a mechanism with very many parts those of evenly chosen ones.
+    """Return all visible arrows; for a mechanism with very many parts those of evenly chosen ones.
 
-    Reactions are those on ``body_j`` at the joint's point there. What acts along a line, a spring for instance, acts
-    on both of its ends; ends on ground are left out. ``instead`` are times to take where there is no value at a time.
+    Reactions are those on ``body_j`` at the joint's point there. Forces along a line, such as a spring, act on both
+    ends; ends on ground are left out. ``instead`` are the times used if there is no value at a time.
     """
     most = max(1, MAX_ARROW_NUMBERS // (3 * len(every)))
     out = [
@@ -195,7 +195,7 @@ def _force_and_moment(
 
 
 def _element_arrows(result: Result, places: AttachedFrames, e: Any) -> Iterator[ArrowData]:
-    """A force element's arrows, by what it acts on: a rope's points, a coordinate, or frames."""
+    """Return the arrows of a force element, by its target: a rope's points, a coordinate, or frames."""
     view = result[e.name]
     if places.end(e.name, "P0") is not None:
         yield from _rope_arrows(places, e.name, view)
@@ -220,7 +220,7 @@ def _element_arrows(result: Result, places: AttachedFrames, e: Any) -> Iterator[
 
 
 def _rope_arrows(places: AttachedFrames, name: str, view: Any) -> Iterator[ArrowData]:
-    """The rope pulls each of its points towards its neighbours."""
+    """Return the rope's forces on its points, towards their neighbours."""
     ends = rope_ends(places, name)
     points = [places.track(end)[0] for end in ends]
     steps = [b - a for a, b in pairwise(points)]
@@ -234,7 +234,7 @@ def _rope_arrows(places: AttachedFrames, name: str, view: Any) -> Iterator[Arrow
 
 
 def rope_ends(places: AttachedFrames, name: str) -> list[AttachedFrame]:
-    """The frames P0, P1, ... of an element that runs over several points."""
+    """Return the frames P0, P1, ... of an element with several points."""
     out: list[AttachedFrame] = []
     while (end := places.end(name, f"P{len(out)}")) is not None:
         out.append(end)
@@ -244,7 +244,7 @@ def rope_ends(places: AttachedFrames, name: str) -> list[AttachedFrame]:
 def _coordinate_arrow(
     result: Result, places: AttachedFrames, name: str, coordinate: str, effort: np.ndarray
 ) -> Iterator[ArrowData]:
-    """An effort along a coordinate of a joint or a point: a force or moment on the second body."""
+    """Return an effort along a coordinate of a joint or a point: a force or moment on the second body."""
     e = result.model[name]
     owner, what = result.model.coordinate(coordinate, e)
     base, end = coordinate_frames_of(e, owner, what, places)

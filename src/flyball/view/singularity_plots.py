@@ -24,7 +24,7 @@ KIND_MARKS = {
     BIFURCATION: ("D", PALETTE[0]),
     SELF_MOTION: ("^", PALETTE[3]),
 }
-MAX_SKETCHES = 12  # pictures
+MAX_SKETCHES = 12  # number of pictures
 SKETCHES_PER_ROW = 4
 ISOMETRIC_PROJECTION = np.array([[-0.7071, 0.7071, 0.0], [-0.4082, -0.4082, 0.8165]])
 
@@ -32,7 +32,7 @@ ISOMETRIC_PROJECTION = np.array([[-0.7071, 0.7071, 0.0], [-0.4082, -0.4082, 0.81
 def singularity_plot(
     result: Singularities, path: str | os.PathLike | None = None, coordinate: str | None = None
 ) -> Any:
-    """Small pictures of the singular positions, a coordinate over the driver's, the distance from singular.
+    """Draw the singular positions, a coordinate over the driver's, and the distance from singularity.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def singularity_plot(
     path : path, optional
         Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
     coordinate : str, optional
-        What is drawn over the driver's coordinate; by default the joint coordinate that moves most.
+        Coordinate drawn over the driver's; by default the joint coordinate that moves most.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def singularity_plot(
 
 
 def plot_sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:
-    """Every body as the lines between its joints, joints as circles, ground as triangles, guides dotted."""
+    """Draw bodies as lines between joints, joints as circles, ground as triangles, guides dotted."""
     names = list(dict.fromkeys(body for body, _, _ in p.outline))
     colors = {b: PALETTE[k % len(PALETTE)] for k, b in enumerate(n for n in names if n != GROUND)}
     seen: dict[str, dict[str, np.ndarray]] = {}
@@ -89,9 +89,9 @@ def plot_sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:
             ax.plot(P[:1, 0], P[:1, 1], "s", color=colors[body], markersize=9, alpha=0.5, zorder=1)
         else:
             P = P if len(P) < 3 else np.vstack([P, P[:1]])
-            width = 6.0 if k % 2 else 3.0  # bars on top of one another stay visible
+            width = 6.0 if k % 2 else 3.0  # coincident bars remain visible
             ax.plot(P[:, 0], P[:, 1], color=colors[body], linewidth=width, alpha=0.6, solid_capstyle="round", zorder=2)
-    for joint in dict.fromkeys(j for _, j, _ in p.outline):  # what slides hangs on its guide
+    for joint in dict.fromkeys(j for _, j, _ in p.outline):  # a slider is connected to its guide
         ends = np.array([points[joint] for points in seen.values() if joint in points])
         if np.ptp(ends, axis=0).max() > 1e-6:
             ax.plot(ends[:, 0], ends[:, 1], ":", color="#555555", linewidth=1.2, zorder=1)
@@ -107,7 +107,7 @@ def plot_sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:
 
 
 def _most_moving_coordinate(result: Singularities) -> str:
-    """The joint or body coordinate that moves most; angles first."""
+    """Return the joint or body coordinate that moves most; angles first."""
     spread = {
         k: (float(np.ptp(v)) if len(v) else 0.0) * (1.0 if "angle" in k else 0.1)
         for k, v in result.values.items()
@@ -121,7 +121,7 @@ def _most_moving_coordinate(result: Singularities) -> str:
             and len(v)
             and np.ptp(np.abs(v - v[0]) - np.abs(values - values[0])) < 1e-9
         ):
-            spread[k] = 0.0  # the same over again
+            spread[k] = 0.0  # duplicate of another coordinate
     return max(spread, key=lambda k: round(spread[k], 9)) if spread else result.coordinate
 
 

@@ -32,7 +32,7 @@ THIN_EDGE, NORMAL_EDGE = 0.4, 1.2  # width of an edge [px]
 
 
 class Face(NamedTuple):
-    """A polygon as seen: points (k, 3), lighter (to 1) or darker (to -1), nearer than its middle [m], its edge [px]."""
+    """A visible polygon: points (k, 3), lightness (-1 to 1), depth before its middle [m], edge width [px]."""
 
     points: np.ndarray
     light: float = 0.0
@@ -41,13 +41,13 @@ class Face(NamedTuple):
 
 
 def circle_points(radius: float, at: float = 0.0) -> np.ndarray:
-    """Points of a circle about z, at a height."""
+    """Return points of a circle about z, at a height."""
     turn = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS, endpoint=False)
     return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(CIRCLE_POINTS, at)])
 
 
 def convex_polygon(points: np.ndarray) -> np.ndarray:
-    """The convex polygon around points of the plane (A. M. Andrew's monotone chain, 1979)."""
+    """Return the convex polygon around points of the plane (A. M. Andrew's monotone chain, 1979)."""
     ordered = sorted(set(map(tuple, np.round(points, 12).tolist())))
     half: list[list[tuple[float, ...]]] = []
     for run in (ordered, ordered[::-1]):
@@ -65,7 +65,7 @@ def _cross_product(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, .
 
 
 def visible_faces(shape: Shape, view: np.ndarray) -> Iterator[Face]:
-    """What is seen of a shape on a body whose axes, as seen, are the columns of ``view``; from the body's origin."""
+    """The visible faces of a shape from the body's origin; the columns of ``view`` are the body's axes as seen."""
     turn = view @ quaternion_to_matrix(np.array(shape.quaternion))
     at = view @ np.array(shape.position)
     for f in _shape_faces(shape, turn):
@@ -108,12 +108,12 @@ def _box_faces(half: np.ndarray, turn: np.ndarray) -> Iterator[Face]:
                 corners = np.zeros((4, 3))
                 corners[:, axis] = side * half[axis]
                 corners[:, i], corners[:, j] = half[i] * np.array([1, -1, -1, 1]), half[j] * np.array([1, 1, -1, -1])
-                flat = abs(normal[2] - 1.0) < 1e-9  # seen from the front: nothing else is
+                flat = abs(normal[2] - 1.0) < 1e-9  # seen from the front: nothing else is visible
                 yield Face(corners @ turn.T, 0.0 if flat else _lightness(normal))
 
 
 def _round_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
-    """A cylinder or a cone: its outline, and the cap that is towards the eye."""
+    """Return the faces of a cylinder or a cone: its outline, and the cap towards the viewer."""
     radius, length = shape.size
     low, high = circle_points(radius, -length / 2), circle_points(radius, length / 2)
     tip = high if shape.kind == "cylinder" else np.array([[0.0, 0.0, length / 2]])
@@ -150,14 +150,14 @@ def _mesh_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
 BODY_COLORS = ("#2f6fb7", "#e58a2b", "#2a9d83", "#c8465a", "#7d63b8", "#d9b02c", "#58b0d8", "#a2572f")  # as on the page
 INK_COLOR, GUIDE_COLOR, PAPER_COLOR = "#1d2733", "#8b96a3", "#ffffff"
 PICTURE_WIDTH, PICTURE_HEIGHT, PICTURE_MARGIN = 420.0, 280.0, 24.0  # [px]
-AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(22.0)  # from where spatial mechanisms are seen
+AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(22.0)  # view direction of spatial mechanisms
 PIN_RADIUS, BLOCK_HALF_SIZE = 4.5, 5.0  # radius of a hinge, half a slide's block [px]
 SPRING_COILS = 7
 UNMARKED_SYMBOLS = ("gear", "rack", "wheel", "ball", "roller", "plane", "rail", "cam", "knife_edge", "bushing")
 
 
 class Stroke(NamedTuple):
-    """Something to draw: points on the paper [m], how far it stands towards the eye, and how it looks."""
+    """An object to draw: points on the paper [m], depth towards the viewer, and style."""
 
     points: np.ndarray
     depth: float
@@ -166,11 +166,11 @@ class Stroke(NamedTuple):
     width: float = 1.2
     closed: bool = True
     dash: str = ""
-    pin: str = ""  # a symbol of fixed size at the only point: "circle", "block" or "ground"
+    pin: str = ""  # a symbol of fixed size at a single point: "circle", "block" or "ground"
 
 
 def still_svg(recording: Recording) -> str:
-    """The picture of the first time of a recording, as the text of an SVG element."""
+    """Return the picture of the first time of a recording, as the text of an SVG element."""
     eye = _view_axes(recording.planar)
     drawn = list(_all_strokes(recording, eye))
     if not drawn:
@@ -189,7 +189,8 @@ def still_svg(recording: Recording) -> str:
     body = "".join(_stroke_svg(s, placed(s.points)) for s in back_to_front)
     title = escape(f"{recording.name} as drawn")
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" width="{PICTURE_WIDTH:g}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" '
+        f'width="{PICTURE_WIDTH:g}" '
         f'height="{height:.0f}" role="img" stroke-linejoin="round" stroke-linecap="round"><title>{title}</title>'
         f'<rect width="100%" height="100%" fill="{PAPER_COLOR}"/>{body}</svg>'
     )
@@ -231,7 +232,7 @@ def _body_strokes(body: RecordedBody, eye: np.ndarray, color: str, p: np.ndarray
 
 
 def _face_color(color: str, face: Face) -> str:
-    """The colour of a face: lighter towards the light, by mixing it with white or ink."""
+    """Return the colour of a face, shaded by mixing it with white or ink."""
     if not color.startswith("#"):
         return color
     digits = color[1:] if len(color) == 7 else "".join(2 * c for c in color[1:])
@@ -241,7 +242,7 @@ def _face_color(color: str, face: Face) -> str:
 
 
 def _line_stroke(line: RecordedLine, eye: np.ndarray, size: float) -> Stroke:
-    """A spring as a zigzag, anything else as a line."""
+    """Return a spring as a zigzag, anything else as a line."""
     seen = np.array([p[0] for p in line.points]) @ eye.T
     points, depth = seen[:, :2], float(seen[:, 2].mean())
     if line.kind == "spring":
@@ -290,9 +291,15 @@ def _stroke_svg(s: Stroke, points: np.ndarray) -> str:
 
 def _pin_svg(pin: str, x: float, y: float) -> str:
     if pin == "circle":
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{PIN_RADIUS}" fill="{PAPER_COLOR}" stroke="{INK_COLOR}" stroke-width="1.6"/>'
+        return (
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{PIN_RADIUS}" fill="{PAPER_COLOR}" '
+            f'stroke="{INK_COLOR}" stroke-width="1.6"/>'
+        )
     if pin == "block":
-        at = f'x="{x - BLOCK_HALF_SIZE:.1f}" y="{y - BLOCK_HALF_SIZE:.1f}" width="{2 * BLOCK_HALF_SIZE}" height="{2 * BLOCK_HALF_SIZE}"'
+        at = (
+            f'x="{x - BLOCK_HALF_SIZE:.1f}" y="{y - BLOCK_HALF_SIZE:.1f}" width="{2 * BLOCK_HALF_SIZE}" '
+            f'height="{2 * BLOCK_HALF_SIZE}"'
+        )
         return f'<rect {at} rx="1.5" fill="{PAPER_COLOR}" stroke="{INK_COLOR}" stroke-width="1.6"/>'
     foot, half = y + 12.0, 9.0
     ticks = "".join(f"M{x + d:.1f} {foot:.1f}l-4 5" for d in (-5.0, 0.0, 5.0, 10.0))
@@ -304,10 +311,9 @@ def _pin_svg(pin: str, x: float, y: float) -> str:
 
 
 def mechanism_html(model: Model) -> str:
-    """What a mechanism consists of, with a picture of it as drawn, for ``_repr_html_``; compiles nothing.
+    """The parts of a mechanism and a picture of the reference configuration, for ``_repr_html_``; nothing is compiled.
 
-    A description that is not finished, or cannot be drawn yet, is shown without a picture: what is wrong with it is
-    for the analyses to say.
+    An incomplete description that cannot be drawn yet is shown without a picture; analyses report its errors.
     """
     text = f'<pre style="line-height:1.35;overflow-x:auto">{html.escape(summary(model))}</pre>'
     try:
@@ -318,13 +324,13 @@ def mechanism_html(model: Model) -> str:
     return f"<div>{picture}{text}</div>"
 
 
-# The mechanism as drawn, read like any result: for pictures before anything is computed.
+# The reference configuration, read like any result, for pictures before anything is computed.
 
 
 def reference_result(model: Model) -> Result:
-    """The mechanism where it is drawn, at rest and without loads, as a result with one time.
+    """Return the reference configuration, at rest and without loads, as a result with one time.
 
-    Nothing is assembled and nothing compiled: bodies are where the description puts them, joints may be open.
+    Nothing is assembled or compiled: bodies have their described poses, joints may be open.
 
     Raises
     ------

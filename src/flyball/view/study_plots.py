@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from ..results.study import Indices, Study
 
 
-LOG_RATIO = 10.0  # the largest over the least of what may need a logarithmic axis
-MIN_COLOR_RANGE = 1.0001  # a colour scale has to have a length, even where all is alike
+LOG_RATIO = 10.0  # ratio of largest to smallest value for a logarithmic axis
+MIN_COLOR_RANGE = 1.0001  # least extent of a colour scale, even for equal values
 
 
 def is_logarithmic(values: np.ndarray, wide: float = LOG_RATIO) -> bool:
-    """Whether values lie more evenly by their logarithms: their median, beside the middle of the least and largest."""
+    """Return whether values are more uniform in logarithms, by the position of their median in their range."""
     known = np.unique(values[np.isfinite(values)])
     if len(known) < 3 or known[0] <= 0.0 or known[-1] < wide * known[0]:
         return False
@@ -43,13 +43,13 @@ def is_logarithmic(values: np.ndarray, wide: float = LOG_RATIO) -> bool:
 
 
 def set_scale(ax: Any, axis: str, values: np.ndarray, wide: float = LOG_RATIO) -> None:
-    """Make an axis logarithmic where that shows these values more evenly."""
+    """Set a logarithmic axis if values are more uniform in logarithms."""
     if is_logarithmic(values, wide):
         getattr(ax, f"set_{axis}scale")("log")
 
 
 def color_norm(values: np.ndarray, wide: float = LOG_RATIO) -> Any:
-    """What turns values into parts of a colour map: linear, or by logarithms."""
+    """Return the colour normalisation of values: linear or logarithmic."""
     from matplotlib.colors import LogNorm, Normalize
 
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -58,8 +58,8 @@ def color_norm(values: np.ndarray, wide: float = LOG_RATIO) -> Any:
     return Normalize(low, high if high > low else low + (abs(low) or 1.0) * (MIN_COLOR_RANGE - 1.0))
 
 
-SURFACE_POINTS = 48  # places along each axis
-MIN_SINGULAR_PART = 1e-10  # smallest part of the largest singular value of a local fit that counts
+SURFACE_POINTS = 48  # grid points along each axis
+MIN_SINGULAR_PART = 1e-10  # smallest relative singular value of a local fit
 
 
 def surface_of_means(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -93,7 +93,7 @@ def surface_of_means(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.nd
 
 
 def _local_fit(points: np.ndarray, z: np.ndarray, at: np.ndarray, width: float) -> np.ndarray:
-    """Values at some places of the planes that fit best near each of them."""
+    """Return values at some points of the planes fitted locally around each of them."""
     d = points[None] - at[:, None]
     w = np.exp(-0.5 * (d**2).sum(axis=2) / width**2)
     A = np.concatenate([np.ones((*d.shape[:2], 1)), d], axis=2)
@@ -102,10 +102,10 @@ def _local_fit(points: np.ndarray, z: np.ndarray, at: np.ndarray, width: float) 
     return np.einsum("gij,gj->gi", np.linalg.pinv(S, rcond=MIN_SINGULAR_PART, hermitian=True), r)[:, 0]
 
 
-MAX_SINGLE_CURVES = 40  # that are drawn one by one
-MAX_LEGEND_CURVES = 8  # that are told by a legend
-PERCENTILE_BANDS = ((5.0, 95.0, 0.15), (25.0, 75.0, 0.3))  # percent, and how dark what lies between them is
-DARKEST_COLOR, BRIGHTEST_COLOR = 0.0, 0.88  # parts of the colour map that can be seen on white
+MAX_SINGLE_CURVES = 40  # largest number of curves drawn one by one
+MAX_LEGEND_CURVES = 8  # largest number of curves with a legend
+PERCENTILE_BANDS = ((5.0, 95.0, 0.15), (25.0, 75.0, 0.3))  # percentile ranges, and their shading
+DARKEST_COLOR, BRIGHTEST_COLOR = 0.0, 0.88  # parts of the colour map that are visible on white
 
 
 def plot_study_curves(drawing: Any, ax: Any, found: Study, name: str) -> None:
@@ -129,7 +129,7 @@ def _plot_bands(ax: Any, t: np.ndarray, y: np.ndarray) -> None:
 
 
 def _plot_named_curves(ax: Any, found: Study, y: np.ndarray, points: np.ndarray) -> None:
-    """Each with the values of its parameters."""
+    """Draw curves labelled with the values of their parameters."""
     varied = [k for k in range(points.shape[1]) if np.ptp(points[:, k]) > 0.0] or [0]
     for i, (curve, point) in enumerate(zip(y, points, strict=True)):
         label = ", ".join(f"{found.parameters[k]} = {point[k]:.4g}" for k in varied)
@@ -139,7 +139,7 @@ def _plot_named_curves(ax: Any, found: Study, y: np.ndarray, points: np.ndarray)
 
 
 def _plot_colored_curves(drawing: Any, ax: Any, found: Study, y: np.ndarray, points: np.ndarray) -> None:
-    """By the value of the parameter that tells most of them apart."""
+    """Draw curves coloured by the most influential parameter."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap
@@ -155,7 +155,7 @@ def _plot_colored_curves(drawing: Any, ax: Any, found: Study, y: np.ndarray, poi
 
 
 def most_explaining_parameter(points: np.ndarray, y: np.ndarray) -> int:
-    """The parameter that the curves depend on most: by how much a straight line over its ranks explains of them."""
+    """Return the parameter that explains most of the curves' variance, by linear regression on its ranks."""
     known = y[:, np.isfinite(y).all(axis=0)]
     ranks = np.argsort(np.argsort(points, axis=0, kind="stable"), axis=0).astype(float)
     ranks = np.stack([_mean_ranks(x, r) for x, r in zip(points.T, ranks.T, strict=True)], axis=1)
@@ -166,13 +166,13 @@ def most_explaining_parameter(points: np.ndarray, y: np.ndarray) -> int:
 
 
 def _mean_ranks(x: np.ndarray, ranks: np.ndarray) -> np.ndarray:
-    """Equal values have the mean of their ranks."""
+    """Return ranks, with mean ranks for equal values."""
     _, group = np.unique(x, return_inverse=True)
     return (np.bincount(group, ranks) / np.bincount(group))[group]
 
 
-MAX_MARKED_POINTS = 40  # points on a line that are marked
-QUANTITY_LOG_RATIO = 100.0  # the largest over the least of quantities that may need a logarithmic axis
+MAX_MARKED_POINTS = 40  # largest number of marked points on a line
+QUANTITY_LOG_RATIO = 100.0  # ratio of largest to smallest value for a logarithmic axis of quantities
 CONTOUR_LEVELS = 24
 PathLike = str | os.PathLike | None
 
@@ -268,12 +268,12 @@ def indices(found: Indices, path: PathLike = None) -> Any:
 
 def _checked_names(found: Study, of: Sequence[str]) -> list[str]:
     for name in of:
-        found[name]  # says what there is
+        found[name]  # explanatory text
     return list(of or found.of)
 
 
 def _scalar_names(found: Study, of: Sequence[str]) -> list[str]:
-    """Quantities that are one number a run."""
+    """Return the scalar quantities."""
     names = _checked_names(found, of) if of else [name for name in found.of if found.values[name].ndim == 1]
     curves = [name for name in names if found.values[name].ndim > 1]
     if curves or not names:
@@ -283,7 +283,7 @@ def _scalar_names(found: Study, of: Sequence[str]) -> list[str]:
 
 
 def _bin_edges(y: np.ndarray) -> Any:
-    """Edges of a histogram, by logarithms where its axis is."""
+    """Return edges of a histogram, logarithmic if its axis is."""
     if is_logarithmic(y, QUANTITY_LOG_RATIO):
         return np.exp(np.histogram_bin_edges(np.log(y), "auto"))
     return "auto" if np.ptp(y) > 0.0 else 1
@@ -319,7 +319,7 @@ def _plot_scatter(row: Any, found: Study, name: str) -> None:
 
 
 def _plot_samples(ax: Any, x: np.ndarray, y: np.ndarray, z: np.ndarray, scattered: bool) -> Any:
-    """By triangles between samples; the smooth mean where others vary too; by their colours if they lie on a line."""
+    """Draw triangles between samples; the smooth mean if other parameters vary; colours if samples are on a line."""
     from scipy.spatial import Delaunay, QhullError
 
     if len(z) < 3:
@@ -341,7 +341,7 @@ def _plot_samples(ax: Any, x: np.ndarray, y: np.ndarray, z: np.ndarray, scattere
 
 
 def _contour_levels(z: np.ndarray) -> dict[str, Any]:
-    """Where colours change, by logarithms of what is spread in these."""
+    """Return contour levels, logarithmic if values are."""
     if not is_logarithmic(z, QUANTITY_LOG_RATIO):
         return {"levels": CONTOUR_LEVELS}
     low, high = float(np.nanmin(z)), float(np.nanmax(z))
@@ -349,7 +349,7 @@ def _contour_levels(z: np.ndarray) -> dict[str, Any]:
 
 
 def _plot_surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> None:
-    """Over a grid as it is, the mean over its other axes; over samples what lies between them."""
+    """Draw a grid, averaged over its other axes; for samples an interpolation."""
     i, j = found.parameters.index(x), found.parameters.index(y)
     values = found[name]
     if found.axes and min(len(found.axes[i]), len(found.axes[j])) > 1:
@@ -403,7 +403,7 @@ def series(found: EquilibriumSeries, *names: str, path: str | os.PathLike | None
 
 
 def equilibrium_branches(found: EquilibriumSeries) -> list[Branch]:
-    """The equilibria in order, with those at jumps, cut where it jumps."""
+    """Return the equilibria in order, with those at jumps, cut at jumps."""
     out: list[Branch] = [[]]
     jumps = list(found.jumps)
     for k, (value, e) in enumerate(zip(found.values, found.equilibria, strict=True)):
@@ -436,7 +436,7 @@ def _plot_equilibrium_curve(ax: Axes, found: EquilibriumSeries, name: str, color
 
 
 def _explain_dashes(ax: Axes, found: EquilibriumSeries) -> None:
-    """What dashes and dots mean, where there are some."""
+    """Explain dashes and dots, if there are any."""
     if UNSTABLE in found.stability or any(j.before.stability == UNSTABLE for j in found.jumps):
         ax.plot([], [], color="#555555", linestyle=UNSTABLE_DASHES, label="unstable")
     if found.jumps:
@@ -444,9 +444,9 @@ def _explain_dashes(ax: Axes, found: EquilibriumSeries) -> None:
 
 
 def sensitivity_plot(s: Sensitivity, path: str | os.PathLike | None = None) -> Any:
-    """One panel a quantity: what a change of each parameter by one percent changes, over time or as bars.
+    """Draw for each quantity its change for a one percent change of each parameter, over time or as bars.
 
-    Parameters that are zero count by their unit.
+    For parameters that are zero a change by one unit is used.
     """
     percent = np.array([0.01 * abs(s.parameters[p]) or 1.0 for p in s.to])
     with plot_style():
@@ -480,7 +480,7 @@ def _sensitivity_panel(axis: Any, s: Sensitivity, k: int, percent: np.ndarray) -
         axis.legend(**LEGEND_BESIDE)
 
 
-OPTIMUM_STYLES: dict[str, dict[str, Any]] = {  # what is drawn, in this order
+OPTIMUM_STYLES: dict[str, dict[str, Any]] = {  # drawn in this order
     "start": {"color": "#8a8a8a", "linestyle": (0, (4, 3)), "marker": "o"},
     "target": {"color": PALETTE[1], "linestyle": (0, (1.5, 2)), "marker": "x"},
     "optimum": {"color": PALETTE[0], "linestyle": "-", "marker": "o"},
@@ -488,7 +488,7 @@ OPTIMUM_STYLES: dict[str, dict[str, Any]] = {  # what is drawn, in this order
 
 
 def optimum_plot(found: Optimum, path: str | os.PathLike | None = None) -> Any:
-    """One panel a quantity, over time or side by side; eigenvalues in the complex plane. See `Optimum.plot`."""
+    """One panel for each quantity, over time or side by side; eigenvalues in the complex plane. See `Optimum.plot`."""
     parts = {"start": found.start_values, "target": found.target, "optimum": found.values}
     known = {k: v for k, v in parts.items() if v is not None}
     with plot_style():

@@ -1,8 +1,7 @@
 """Symbols of joints, couplings, gear wheels, springs and dampers, and the frames where elements attach.
 
-What is drawn follows from the word that an element's class declares (``drawn``). An unknown word gets a plain
-mark. Gear wheels have pitch circles that follow from the distance of their axes, and teeth that mesh in the
-reference configuration.
+The symbol is selected by the class attribute ``drawn`` of an element. Unknown values give a plain mark. Pitch circles
+of gear wheels follow from the distance of their axes; teeth mesh in the reference configuration.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AttachedFrame:
-    """A frame on a body: origin [m] and axes (columns) from the body's reference frame, and its number."""
+    """A frame on a body: origin [m] and axes (columns) in the body's reference frame, and the body's index."""
 
     body: str
     p: np.ndarray
@@ -34,7 +33,7 @@ class AttachedFrame:
 
     @property
     def grounded(self) -> bool:
-        """Whether it does not move."""
+        """Whether it is fixed in the world."""
         return self.body == GROUND
 
 
@@ -46,7 +45,7 @@ class AttachedFrames:
         self._names = {b: name for name, b in result.values.structure.place.items()}
 
     def end(self, name: str, role: str) -> AttachedFrame | None:
-        """The frame F or M of an element; None if it has no such frame."""
+        """Return the frame F or M of an element; None if it has no such frame."""
         x = self.result.values
         k = x.structure.frame_at.get((name, role, ""))
         if k is None:
@@ -56,24 +55,24 @@ class AttachedFrames:
         return AttachedFrame(body, p + x.bodies[body].com.real, R.reshape(3, 3), k)
 
     def ends(self, e: Any) -> tuple[AttachedFrame, AttachedFrame] | None:
-        """F and M of an element that joins two bodies; None if it does not."""
+        """Return F and M of an element that connects two bodies; None otherwise."""
         a, b = self.end(e.name, "F"), self.end(e.name, "M")
         return None if a is None or b is None else (a, b)
 
     def track(self, end: AttachedFrame) -> tuple[np.ndarray, np.ndarray]:
-        """Origin (n, 3) and axes (n, 3, 3) of a frame in the world, over time."""
+        """Return origin (n, 3) and axes (n, 3, 3) of a frame in the world, over time."""
         n = len(self.result.t)
         p, R = self.result.records.frame(end.frame)[:2]
         full = [np.broadcast_to(c, n) for c in (*p, *R)]
         return np.stack(full[:3], axis=1), np.stack(full[3:], axis=1).reshape(-1, 3, 3)
 
     def seen(self, end: AttachedFrame, other: AttachedFrame) -> np.ndarray:
-        """Origin of the other frame seen from the first, in its axes, over time (n, 3)."""
+        """Return the origin of the other frame relative to the first, in its axes, over time (n, 3)."""
         (p, R), (q, _) = self.track(end), self.track(other)
         return np.einsum("nij,ni->nj", R, q - p)
 
     def reach(self, end: AttachedFrame, other: AttachedFrame) -> tuple[float, float, float, float, float, float]:
-        """Over what stretch the other frame's origin moves along x, y, z of the first: low x, high x, low y, ..."""
+        """Return the ranges of the other frame's origin along x, y, z of the first: low x, high x, low y, ..."""
         d = self.seen(end, other)
         d = d[np.isfinite(d).all(axis=1)]
         if not len(d):
@@ -86,13 +85,13 @@ def float_triple(p: np.ndarray) -> tuple[float, float, float]:
     return tuple(float(c) for c in p)  # type: ignore[return-value]
 
 
-DEFAULT_TEETH = 18  # of the smaller wheel of a pair, where the user gave radii, or too many teeth to be seen
+DEFAULT_TEETH = 18  # of the smaller wheel of a pair, if radii were given, or there are too many teeth to be visible
 MAX_TEETH = 120
 
 
 @dataclass(frozen=True)
 class GearWheel:
-    """A wheel that is drawn: on which body, of what radius, how many teeth, and which way one points at the start."""
+    """A drawn wheel: its body, radius, number of teeth, and direction of one tooth at the start."""
 
     body: str
     radius: float
@@ -101,9 +100,9 @@ class GearWheel:
 
 
 def gear_pair(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) -> Iterator[RecordedJoint]:
-    """Two wheels that touch between their axes; plain discs where the axes are not parallel (bevel gears).
+    """Return two wheels with tangent pitch circles; plain discs if the axes are not parallel (bevel gears).
 
-    Wheels that are ``wheels_so_far`` already, for another pair, are left as they are, and the other one fits them.
+    Wheels in ``wheels_so_far``, drawn for another pair, are unchanged, and the other wheel is fitted to them.
     """
     model = places.result.model
     wheels = _moving_ends(places, model[e.joint_1], model[e.joint_2])
@@ -139,7 +138,7 @@ def gear_pair(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) ->
 
 @dataclass(frozen=True)
 class _Mesh:
-    """Where two wheels with parallel axes a and b meet, seen from the centre of each."""
+    """The contact of two wheels with parallel axes a and b, seen from the centre of each."""
 
     a: np.ndarray
     b: np.ndarray
@@ -147,10 +146,10 @@ class _Mesh:
     inside: bool
 
     def teeth(self, known: Sequence[GearWheel | None], counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A tooth of each, so that they mesh.
+        """Return the direction of a tooth of each, so that they mesh.
 
-        With f the angle from the contact to a tooth in pitches, and s = +1 or -1 as the axes point alike or not: teeth
-        meet gaps where f_1 + s f_2 = 1/2 for wheels that turn against one another, f_1 - s f_2 = 1/2 inside a ring.
+        With f the angle from the contact to a tooth in pitches, and s = +1 or -1 for equal or opposite axes: teeth meet
+        gaps where f_1 + s f_2 = 1/2 for wheels that turn against one another, f_1 - s f_2 = 1/2 inside a ring.
         """
         s = (-1.0 if self.inside else 1.0) * np.sign(self.a @ self.b)
         f = [self.offset(k, w.tooth, w.teeth) if w is not None else None for k, w in enumerate(known)]
@@ -159,11 +158,11 @@ class _Mesh:
         return self.turned(0, one / counts[0]), self.turned(1, other / counts[1])
 
     def offset(self, k: int, tooth: np.ndarray, count: int) -> float:
-        """Angle from the contact to a tooth, in pitches, about the wheel's axis."""
+        """Return the angle from the contact to a tooth, in pitches, about the wheel's axis."""
         return _signed_angle((self.a, self.b)[k], self.contacts[k], tooth) * count / (2.0 * np.pi)
 
     def turned(self, k: int, turns: float) -> np.ndarray:
-        """The direction of the contact turned about the wheel's axis."""
+        """Return the direction of the contact rotated about the wheel's axis."""
         return _rotated((self.a, self.b)[k], self.contacts[k], 2.0 * np.pi * turns)
 
 
@@ -174,7 +173,7 @@ def _find_wheel(wheels: Sequence[GearWheel], body: str, radius: float, teeth: in
 
 
 def _signed_angle(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """Angle from one direction to another about an axis that is square to both [rad]."""
+    """Return the angle from one direction to another about an axis perpendicular to both [rad]."""
     return float(np.arctan2(np.cross(start, end) @ axis, start @ end))
 
 
@@ -183,7 +182,7 @@ def _rotated(axis: np.ndarray, direction: np.ndarray, angle: float) -> np.ndarra
 
 
 def rack(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) -> Iterator[RecordedJoint]:
-    """The pinion, and the toothed bar whose pitch line passes the pinion's centre at its radius."""
+    """Return the pinion, and the rack whose pitch line is at the pinion's radius from its centre."""
     model = places.result.model
     movers = _moving_ends(places, model[e.pinion], model[e.rack])
     if movers is None or not len(places.result.t):
@@ -192,9 +191,9 @@ def rack(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) -> Iter
     radius = float(places.result.values.numbers[e.name].radius)
     (p, n), (_, a) = (_initial_frame(places, w) for w in movers)
     for end, joint in ((pinion, model[e.pinion]), (bar, model[e.rack])):
-        if end.body == model.carrier(joint.body_i, joint):  # its coordinate is that of the other body
+        if end.body == model.carrier(joint.body_i, joint):  # its coordinate belongs to the other body
             radius = -radius
-    # displacement = radius * angle: the rim that goes along +a lies at a x n
+    # displacement = radius * angle: the rim point moving along +a is at a x n
     side = np.cross(a, n) * np.sign(radius)
     radius = abs(radius)
     same = [w for w in wheels_so_far if w.body == pinion.body and abs(w.radius - radius) < 1e-3 * radius]
@@ -204,7 +203,8 @@ def rack(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) -> Iter
         x = _in_frame(places, pinion, side)
         size = radius, float(DEFAULT_TEETH), float(np.arctan2(x[1], x[0])), 0.0
         yield _gear_symbol(e.name, "gear", pinion, pinion.R, bar.body, size)
-    # the bar's frame: origin in a gap where the two meet as drawn, x along the slide, y towards the pinion
+    # the rack's frame: origin in a tooth gap at the contact in the reference configuration, x along the slide, y
+    # towards the pinion
     q, S = places.track(bar)
     body = S[0] @ bar.R.T
     axes = body.T @ np.column_stack([a, -side, np.cross(a, -side)])
@@ -220,7 +220,7 @@ def rack(e: Any, places: AttachedFrames, wheels_so_far: list[GearWheel]) -> Iter
 
 
 def _moving_ends(places: AttachedFrames, first: Any, second: Any) -> tuple[AttachedFrame, AttachedFrame] | None:
-    """Of two joints on one carrier the ends that are not on it; else the ends that move, of two the second."""
+    """Return, for two joints on one carrier, the frames off the carrier; else the moving frames."""
     pairs = [places.ends(joint) for joint in (first, second)]
     if pairs[0] is None or pairs[1] is None:
         return None
@@ -234,13 +234,13 @@ def _moving_ends(places: AttachedFrames, first: Any, second: Any) -> tuple[Attac
 
 
 def _initial_frame(places: AttachedFrames, end: AttachedFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Origin and z axis of a frame in the world, at the first time."""
+    """Return origin and z axis of a frame in the world, at the first time."""
     p, R = places.track(end)
     return p[0], R[0][:, 2]
 
 
 def _in_frame(places: AttachedFrames, end: AttachedFrame, direction: np.ndarray) -> np.ndarray:
-    """A direction in the world, seen in a frame at the first time."""
+    """Return a world direction in a frame at the first time."""
     return places.track(end)[1][0].T @ direction
 
 
@@ -252,24 +252,24 @@ def _gear_symbol(
 
 
 def _tooth_counts(z: np.ndarray) -> np.ndarray:
-    """Numbers of teeth to draw: the user's where they are whole and can be seen, else in the same ratio, about."""
+    """Return the numbers of teeth to draw: as given if whole and visible, else approximately in the same ratio."""
     if (z == z.round()).all() and z.min() >= 6 and z.max() <= MAX_TEETH:
         return z.astype(int)
     return np.clip((z / z.min() * DEFAULT_TEETH).round(), 3, MAX_TEETH).astype(int)
 
 
-MIN_SPRING_LENGTH = 0.5  # length of a spring where it is shortest, as part of the mechanism's typical length
-TRAVEL_PART = 0.3  # and of how far it moves
-SPIRAL_RADII = (0.03, 0.13)  # radii of a spiral, as parts of the typical length
+MIN_SPRING_LENGTH = 0.5  # shortest length of a drawn spring, relative to the mechanism's typical length
+TRAVEL_PART = 0.3  # and relative to its travel
+SPIRAL_RADII = (0.03, 0.13)  # radii of a spiral, relative to the typical length
 SPIRAL_TURNS, SPIRAL_POINTS = 2.75, 120
 
 
 def coordinate_spring_line(
     e: Any, places: AttachedFrames, every: np.ndarray, size: float
 ) -> RecordedLine | RecordedCurve | None:
-    """What shows a spring or damper along a coordinate; None if it is neither, or nothing says where it is.
+    """Return the line of a spring or damper along a coordinate; None if it is neither, or has no position.
 
-    Where its other end is held is not described: beyond the places where the coordinate comes, and where it is at rest.
+    The model does not define its other end; it is placed beyond the range and the rest position of the coordinate.
     """
     numbers = places.result.values.numbers[e.name]
     if not isinstance(e, CoordinateForce) or not hasattr(numbers, "stiffness"):
@@ -288,7 +288,7 @@ def coordinate_spring_line(
 def coordinate_frames_of(
     e: Any, owner: Any, what: str, places: AttachedFrames
 ) -> tuple[AttachedFrame | None, AttachedFrame | None]:
-    """The frame whose axes a coordinate is along or about, and that which moves along or about them."""
+    """Return the frame whose axes define a coordinate, and the frame that moves."""
     moving = places.end(e.name, "M") or places.end(owner.name, "M")
     if not isinstance(owner, Joint):
         return moving, moving
@@ -296,12 +296,12 @@ def coordinate_frames_of(
 
 
 def is_rotational(owner: Any, what: str) -> bool:
-    """Whether a coordinate is an angle."""
+    """Return whether a coordinate is an angle."""
     return owner.coordinates[what].unit == "rad" if isinstance(owner, Joint) else what == "angle"
 
 
 def coordinate_axis(owner: Any, what: str, base: AttachedFrame, places: AttachedFrames) -> np.ndarray:
-    """The direction of a coordinate, or its axis, in the world over time, (n, 3)."""
+    """Return the direction of a coordinate, or its axis, in the world over time, (n, 3)."""
     k = "xyz".index(what) if what in ("x", "y", "z") and not is_rotational(owner, what) else 2
     if not isinstance(owner, Joint):
         return np.tile(np.eye(3)[k], (len(places.result.t), 1))
@@ -309,7 +309,7 @@ def coordinate_axis(owner: Any, what: str, base: AttachedFrame, places: Attached
 
 
 def _coordinate_rotation(owner: Any, what: str) -> Any:
-    """Axes of a coordinate from those of its frame."""
+    """Return the axes of a coordinate relative to those of its frame."""
     if not isinstance(owner, Joint):
         return np.eye(3)
     c = owner.coordinates[what]
@@ -338,7 +338,7 @@ def _spring_line(
 
 
 def _spiral_spring(e: Any, base: AttachedFrame, turn: np.ndarray, size: float) -> RecordedCurve:
-    """Fixed on the body that it turns against; it does not wind up."""
+    """Return a spiral spring fixed on the body against which it turns; it is not drawn deformed."""
     s = np.linspace(0.0, 1.0, SPIRAL_POINTS)
     radius, angle = size * np.interp(s, (0.0, 1.0), SPIRAL_RADII), 2.0 * np.pi * SPIRAL_TURNS * s
     flat = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * s], axis=1)
@@ -349,23 +349,23 @@ POINTS_PER_VERTEX, MIN_PROFILE_POINTS, MAX_PROFILE_POINTS = (
     8,
     120,
     600,
-)  # points of a drawn profile: for each that was given, and in all
+)  # points of a drawn profile: for each given point, and in total
 SymbolPart = RecordedJoint | RecordedCurve | RecordedLine
 
-BODY_SYMBOLS = ("gear", "rack", "wheel", "ball")  # symbols that are the body itself, where it has no shape of its own
+BODY_SYMBOLS = ("gear", "rack", "wheel", "ball")  # symbols of the body itself, if it has no shape of its own
 
 
 def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: list[GearWheel]) -> Iterator[SymbolPart]:
-    """What shows a joint, a coupling or a bushing.
+    """Return the symbols of a joint, a coupling or a bushing.
 
     Parameters
     ----------
     e : Joint, Coupling or Force
     places : Places
     every : ndarray of int
-        The times that are shown.
+        Indices of the displayed times.
     wheels : list of Wheel
-        Toothed wheels that are drawn already; new ones are added.
+        Gear wheels drawn so far; new ones are added.
     """
     kind = getattr(e, "drawn", "")
     if kind == "gear":
@@ -380,7 +380,7 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
     if kind == "link":
         yield _link_line(e, places, every)
     elif kind == "universal" and np.abs(places.seen(F, M)).max(initial=0.0) > 1e-6 * places.result.values.length:
-        yield _link_line(e, places, every)  # a massless link with a hinge at either end
+        yield _link_line(e, places, every)  # a massless link with a hinge at each end
         yield _joint_symbol(e, "revolute", F, M, places)
         yield _joint_symbol(e, "revolute", M, F, places)
     elif kind in ("planar", "point_in_plane"):
@@ -409,12 +409,12 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
 
 
 def ends_by_carrier(F: AttachedFrame, M: AttachedFrame) -> tuple[AttachedFrame, AttachedFrame]:
-    """The end that a symbol rides on: ground where the joint is fixed there, else the first body."""
+    """Return the frame on which a symbol is fixed: ground if the joint is fixed there, else that of the first body."""
     return (M, F) if M.grounded else (F, M)
 
 
 def wheel_radius(e: Any, places: AttachedFrames) -> float:
-    """Radius of a rolling wheel: as given, with its tread; else the distance of its centre from what it rolls on."""
+    """The radius of a rolling wheel: as given, with its tread; else the distance of its centre from the surface."""
     n = places.result.values.numbers[e.name]
     if hasattr(n, "radius"):
         return float(n.radius) + float(getattr(n, "tread", 0.0))
@@ -436,7 +436,7 @@ def cam_outline(n: Any) -> np.ndarray | None:
     s = np.r_[0.0, np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))]
     each = max(
         1, min(max(POINTS_PER_VERTEX, MIN_PROFILE_POINTS // (len(p) - 1)), MAX_PROFILE_POINTS // (len(p) - 1))
-    )  # the points given are among them
+    )  # the given points are among them
     at = np.interp(np.arange(each * (len(p) - 1) + (not closed)) / each, np.arange(len(p)), s)
     xy = CubicSpline(s, p, bc_type="periodic" if closed else "natural")(at)
     return np.column_stack([xy, np.zeros(len(xy))])

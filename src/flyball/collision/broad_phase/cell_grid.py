@@ -1,9 +1,9 @@
 """Hashed grid with levels by size, and the sorting of bounded shapes into slots in the order of their cells.
 
-Every shape stands in one cell, that of its envelope's middle. Shapes of a level differ in size by no more than
-a factor of two (ten for shapes that have gained speed), and its cells are as wide as the largest. A shape
-examines the neighbouring cells at each level, so the cost is linear in the number of shapes, whatever their
-sizes (after Eitz and Gu 2007, "Hierarchical spatial hashing for real-time collision detection").
+Every shape is in one cell, that of its envelope's middle. Shapes of a level differ in size by at most a factor
+of two (ten for shapes that have gained speed), and its cells are as wide as the largest. A shape examines the
+neighbouring cells at each level, so the cost is linear in the number of shapes, whatever their sizes (after Eitz
+and Gu 2007, "Hierarchical spatial hashing for real-time collision detection").
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ from .workspace import (
     TYPICAL_RADIUS,
 )
 
-SMALLEST_EDGE = 1e-6  # edges of cells, in usual radii: shapes may be points
-FARTHEST_CELL = 1e15  # cells from the corner; what is further away stands in the last one
+SMALLEST_EDGE = 1e-6  # smallest edge of a cell, in typical radii: shapes may be points
+FARTHEST_CELL = 1e15  # largest distance from the corner in cells; shapes beyond it are in the last cell
 KEY_BITS, KEY_MASK = 21, (1 << 21) - 1
 
 
 @formula
 def cell_index(B, l, c, x):
-    """Number of the cell along axis c at level l."""
+    """Return the number of the cell along axis c at level l."""
     k = (x - B.level_x[l, GRID_CORNER + c]) * B.level_x[l, INVERSE_EDGE]
     k = min(FARTHEST_CELL, max(-FARTHEST_CELL, k))
     whole = int(k)
@@ -61,20 +61,20 @@ def cell_index(B, l, c, x):
 
 @formula
 def cell_key(a, b, c):
-    """A cell by one number; cells are told apart as long as fewer than 2^21 lie between them along an axis."""
+    """Key of a cell; unique while fewer than 2^21 cells are between two cells along each axis."""
     return (a & KEY_MASK) | (b & KEY_MASK) << KEY_BITS | (c & KEY_MASK) << 2 * KEY_BITS
 
 
 @formula
 def bucket_of_cell(B, l, a, b, c):
-    """Where in `Search.head` a cell stands; cells of a row stand side by side."""
+    """Bucket of a cell in `Search.head`; cells of a row have adjacent buckets."""
     k = a + B.level_i[l, ROW_STRIDE] * b + B.level_i[l, LAYER_STRIDE] * c
     return B.level_i[l, LEVEL_FIRST] + (k & B.level_i[l, LEVEL_MASK])
 
 
 @formula
 def size_level(largest, whole):
-    """By which power of two a shape is smaller than the largest of its class."""
+    """Size level: power of two by which a shape is smaller than the largest of its class."""
     k, edge = 0, 0.5 * largest
     while whole <= edge and k < SIZE_LEVELS - 1:
         k, edge = k + 1, 0.5 * edge
@@ -83,7 +83,7 @@ def size_level(largest, whole):
 
 @formula
 def group_extent(sums, g, c, edge):
-    """Over how many cells a group lies along axis c (without shapes far from the rest); where these begin."""
+    """Return the number of cells that a group covers along axis c (without distant shapes), and their start."""
     n = sums[g, 0]
     mean = sums[g, 2 + c] / n
     spread = 6.0 * sqrt(max(0.0, sums[g, 5 + c] / n - mean * mean)) / edge
@@ -92,7 +92,7 @@ def group_extent(sums, g, c, edge):
 
 @formula
 def lay_out_levels(B):
-    """Levels from the sums over groups of one class and size: `Search.level_i`, `level_x`; all places emptied."""
+    """Define the levels from the sums over one class and size: `Search.level_i`, `level_x`; clears all buckets."""
     count, base = 0, 0
     for g in range(B.sums.shape[0]):
         n = int(B.sums[g, 0])
@@ -125,7 +125,7 @@ def lay_out_levels(B):
 
 @formula
 def cell_of_slot(B, s, l):
-    """Name and place of the cell in which slot s stands at level l."""
+    """Key and bucket of the cell of slot s at level l."""
     a = cell_index(B, l, 0, B.envelope[s, MIDDLE])
     b = cell_index(B, l, 1, B.envelope[s, MIDDLE + 1])
     c = cell_index(B, l, 2, B.envelope[s, MIDDLE + 2])
@@ -134,7 +134,7 @@ def cell_of_slot(B, s, l):
 
 @formula
 def remove_from_cell(B, s):
-    """Take a slot out of its cell (before its envelope changes)."""
+    """Remove a slot from its cell (before its envelope changes)."""
     l = B.slot[s, SLOT_LEVEL]
     B.level_i[l, LEVEL_SHAPES] -= 1
     _, at = cell_of_slot(B, s, l)
@@ -149,7 +149,7 @@ def remove_from_cell(B, s):
 
 @formula
 def insert_into_cell(B, s, l):
-    """Put a slot into its cell at level l."""
+    """Insert a slot into its cell at level l."""
     B.slot[s, SLOT_LEVEL] = l
     B.level_i[l, LEVEL_SHAPES] += 1
     B.key[s], at = cell_of_slot(B, s, l)
@@ -159,7 +159,7 @@ def insert_into_cell(B, s, l):
 
 @formula
 def finest_level(B, of, whole):
-    """The finest level of a class that takes a shape of this size, or -1."""
+    """Finest level of a class for a shape of this size, or -1."""
     best = -1
     for l in range(B.count[LEVELS]):
         takes = B.level_i[l, LEVEL_CLASS] == of and 2.0 * whole <= B.level_x[l, CELL_EDGE]
@@ -170,7 +170,7 @@ def finest_level(B, of, whole):
 
 @formula
 def neighbour_cells(B, s, l):
-    """First and last cells along each axis in which partners of slot s can stand at level l, and how many cells."""
+    """First and last cells along each axis that can contain partners of slot s at level l, and the number of cells."""
     r = B.envelope[s, ENVELOPE_BOUND] + 0.5 * B.level_x[l, CELL_EDGE]
     x, y, z = B.envelope[s, MIDDLE], B.envelope[s, MIDDLE + 1], B.envelope[s, MIDDLE + 2]
     a, d = cell_index(B, l, 0, x - r), cell_index(B, l, 0, x + r)
@@ -182,13 +182,13 @@ def neighbour_cells(B, s, l):
 
 @formula
 def scan_is_cheaper(B, many):
-    """Whether looking at every shape is quicker than looking at so many cells."""
+    """Whether testing every shape is cheaper than visiting this many cells."""
     return many > 27.0 + B.count[BOUNDED]
 
 
 @formula
 def make_envelopes(G, M, B):
-    """Envelopes of all bounded shapes, by shape, in ``raw``; sums over shapes of one class and size in ``sums``."""
+    """Compute the envelopes of all bounded shapes, by shape, in ``raw``, and sums by class and size in ``sums``."""
     for g in range(B.sums.shape[0]):
         for c in range(B.sums.shape[1]):
             B.sums[g, c] = 0.0
@@ -214,7 +214,7 @@ def make_envelopes(G, M, B):
 
 @formula
 def number_slots(B, places):
-    """Slots by counting how many shapes stand at each place: by shape, in ``moved``; ``head`` then tells the first."""
+    """Assign slots by counting sort over the buckets: by shape, in ``moved``; ``head`` then holds the first slots."""
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
             l = int(B.sums[B.mark[i], 8])
@@ -244,7 +244,7 @@ def number_slots(B, places):
 
 @formula
 def fill_slots(G, M, B):
-    """What is kept by slot, from what is kept by shape."""
+    """Copy the data by shape to the arrays by slot."""
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
             s = B.moved[i]
@@ -263,7 +263,7 @@ def fill_slots(G, M, B):
 
 @formula
 def sort_shapes(G, M, B):
-    """New slots and envelopes for all bounded shapes; the frame begins anew."""
+    """Assign new slots and envelopes to all bounded shapes; restarts the frame."""
     for c in range(3):
         B.real[FRAME_ORIGIN + c] = B.real[FRAME_LAG + c] = 0.0
         B.real[FRAME_STEP + c] = B.real[AHEAD] * B.real[FRAME_VELOCITY + c]

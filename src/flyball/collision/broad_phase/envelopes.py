@@ -1,7 +1,7 @@
-"""Envelopes of shapes: made from position and velocity, and checked every step.
+"""Envelopes of shapes: computed from position and velocity, and checked every step.
 
 An envelope is a capsule that contains a shape, with its motion, for several steps. Unbounded shapes (planes,
-and height fields below a plane) have the position at which their pairs were listed, and a slack. `update_slots`
+and height fields below a plane) store the position at which their pairs were listed, and a slack. `update_slots`
 updates all shapes and marks those that have left their envelopes; `set_frame` decides whether the frame of the
 envelopes moves.
 """
@@ -49,32 +49,32 @@ from .workspace import (
 
 @formula
 def rotate_by_mover(M, m, a):
-    """A vector in the axes of mover m, along the world's."""
+    """Convert a vector from the axes of mover m to world axes."""
     return mv(load9(M.pose, m, 3), a)
 
 
 @formula
 def velocity_at_offset(M, m, a):
-    """Velocity of the point that is at a, along the world's axes, from the origin of mover m."""
+    """Velocity of the point at a, in world axes, from the origin of mover m."""
     return add(load3(M.twist, m, 0), cross(load3(M.twist, m, 3), a))
 
 
 @formula
 def velocity_at_point(M, m, p):
-    """Velocity of mover m at a point of the world; of what stands still (-1) there is none."""
+    """Velocity of mover m at a point of the world; zero for fixed shapes (-1)."""
     if m < 0:
         return (0.0, 0.0, 0.0)
     return velocity_at_offset(M, m, sub(p, load3(M.pose, m, 0)))
 
 
-LARGEST_SKIN = 3.0  # in usual radii: larger shapes have no thicker skins
-ENVELOPE_STEPS = 8.0  # an envelope reaches this many steps ahead
-ENVELOPE_LEAD = 0.5  # but no further than this, in radii
+LARGEST_SKIN = 3.0  # upper bound of the skin's reference radius, in typical radii
+ENVELOPE_STEPS = 8.0  # number of steps that an envelope covers
+ENVELOPE_LEAD = 0.5  # upper bound of the covered displacement, relative to the radius
 
 
 @formula
 def update_motion(M, B, i, m, ball, row, s):
-    """Where the middle of shape i is and how it goes, into row s of ``row`` (as `Search.now`)."""
+    """Write centre and velocity of shape i to row s of ``row`` (columns as `Search.now`)."""
     c = load3(B.hold, i, BOUND_CENTRE)
     w = (0.0, 0.0, 0.0)
     p, v = c, w
@@ -91,7 +91,7 @@ def update_motion(M, B, i, m, ball, row, s):
 
 @formula
 def update_axes(G, M, B, s, i, m):
-    """Axes of slot s, shape i of mover m, in the world."""
+    """Compute the axes of slot s, shape i of mover m, in world axes."""
     for c in range(3):
         a = (G.shape_x[i, AXES + c], G.shape_x[i, AXES + 3 + c], G.shape_x[i, AXES + 6 + c])
         if m >= 0:
@@ -101,14 +101,14 @@ def update_axes(G, M, B, s, i, m):
 
 @formula
 def store_axes(B, s):
-    """Remember the axes with which an envelope is made."""
+    """Store the axes for which an envelope is computed."""
     for c in range(9):
         B.turn[s, c] = B.axes[s, c]
 
 
 @formula
 def chord(B, s):
-    """How far the surface has turned since the envelope was made, as a part of the radius: 2 sin(angle / 2)."""
+    """Displacement of the surface by rotation since the envelope was computed, over the radius: 2 sin(angle / 2)."""
     total = 0.0
     for c in range(9):
         total += (B.axes[s, c] - B.turn[s, c]) ** 2
@@ -117,9 +117,9 @@ def chord(B, s):
 
 @formula
 def write_envelope(B, rows, s, at, still):
-    """Make an envelope from row s (columns as `Search.now`), into columns from ``at`` on (as `Search.envelope`).
+    """Compute an envelope from row s (columns as `Search.now`) into columns from ``at`` on (as `Search.envelope`).
 
-    Returns the radius that the ball about it may have got when the shape has gained some speed.
+    Returns the largest radius of its bounding sphere after the shape has gained some speed.
     """
     r, spin = rows[s, SPHERE_RADIUS], rows[s, TURNING_SPEED]
     u = (
@@ -149,7 +149,7 @@ def write_envelope(B, rows, s, at, still):
 
 @formula
 def squared_distance_to_axis(fat, s, x, y, z):
-    """Squared distance of a point, from the middle of the capsule, to its line."""
+    """Squared distance of a point, relative to the capsule's middle, from its axis."""
     a, b, c = fat[s, HALF_LINE], fat[s, HALF_LINE + 1], fat[s, HALF_LINE + 2]
     e2 = a * a + b * b + c * c
     if e2 > 0.0:
@@ -160,7 +160,7 @@ def squared_distance_to_axis(fat, s, x, y, z):
 
 @formula
 def is_inside_envelope(B, s, ball):
-    """Whether a shape, with what it covers in `AHEAD` seconds, is still within its envelope."""
+    """Whether a shape, with its motion in `AHEAD` seconds, is within its envelope."""
     now, fat, real = B.now, B.envelope, B.real
     allowed = fat[s, ENVELOPE_RADIUS] - now[s, SPHERE_RADIUS] - 0.5 * real[MARGIN]
     if not ball:
@@ -180,7 +180,7 @@ def is_inside_envelope(B, s, ball):
 
 @formula
 def squared_distance_to_box(B, axes, s, d):
-    """Squared distance to the box of slot s, with these axes, of a point at d from its middle."""
+    """Squared distance from the box of slot s, with these axes, of a point at d from its centre."""
     total, i = 0.0, B.slot[s, SLOT_SHAPE]
     for c in range(3):
         a = abs(axes[s, c] * d[0] + axes[s, 3 + c] * d[1] + axes[s, 6 + c] * d[2]) - B.hold[i, BOX_HALF + c]
@@ -190,7 +190,7 @@ def squared_distance_to_box(B, axes, s, d):
 
 @formula
 def half_extent(B, axes, s, n):
-    """How far slot s reaches from its middle along a unit vector, and back."""
+    """Half extent of slot s along a unit vector."""
     if B.slot[s, SLOT_FORM] == IS_SPHERE:
         return B.now[s, SPHERE_RADIUS]
     total, i = 0.0, B.slot[s, SLOT_SHAPE]
@@ -202,9 +202,9 @@ def half_extent(B, axes, s, n):
 
 @formula
 def boxes_meet(B, axes, s, t, d, reach):
-    """Whether boxes with these axes, the second's middle at d from the first's, come as near as this.
+    """Whether boxes with these axes, the second at d from the first, are within ``reach`` of each other.
 
-    Along the six axes of their faces; two that cross edge to edge may be further apart than this says.
+    Tests the six axes of their faces only; boxes with crossing edges may be farther apart.
     """
     i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
     for side in range(2):
@@ -222,7 +222,7 @@ def boxes_meet(B, axes, s, t, d, reach):
 
 @formula
 def bounds_meet(B, axes, s, t, d, reach):
-    """Whether the boxes of two slots come as near as this; of a sphere the sphere itself."""
+    """Whether the boxes of two slots are within ``reach`` of each other; spheres are tested as such."""
     if B.slot[s, SLOT_FORM] == IS_SPHERE:
         if B.slot[t, SLOT_FORM] == IS_SPHERE:
             return True
@@ -234,7 +234,7 @@ def bounds_meet(B, axes, s, t, d, reach):
 
 @formula
 def update_plane(G, M, B, w, i, m):
-    """Where the plane of wide shape ``w`` is and how it goes."""
+    """Compute origin, normal and velocity of the plane of wide shape ``w``."""
     x, top = G.shape_x, B.hold[i, BOX_HALF]
     n = (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
     p = add(load3(x, i, PLACE), scale(top, n))
@@ -251,7 +251,7 @@ def update_plane(G, M, B, w, i, m):
 
 @formula
 def plane_advance(B, w):
-    """How far a plane comes along its normal in `AHEAD` seconds, in the frame."""
+    """Advance of a plane along its normal in `AHEAD` seconds, relative to the frame."""
     x = B.wide
     a = x[w, PLANE_NORMAL] * (x[w, PLANE_VELOCITY] - B.real[FRAME_VELOCITY])
     a += x[w, PLANE_NORMAL + 1] * (x[w, PLANE_VELOCITY + 1] - B.real[FRAME_VELOCITY + 1])
@@ -261,7 +261,7 @@ def plane_advance(B, w):
 
 @formula
 def plane_exceeds_slack(B, w):
-    """Whether a wide shape may have got pairs by moving."""
+    """Whether a wide shape has moved so far that it may have new pairs."""
     x, along, turned = B.wide, 0.0, 0.0
     for c in range(3):
         along += x[w, PLANE_NORMAL + c] * (
@@ -273,7 +273,7 @@ def plane_exceeds_slack(B, w):
 
 @formula
 def store_reference_plane(B, w, still):
-    """Remember where a wide shape is while its pairs are looked for."""
+    """Store the position of a wide shape for which its pairs are listed."""
     for c in range(3):
         B.wide[w, REFERENCE_ORIGIN + c] = B.wide[w, PLANE_ORIGIN + c] - B.real[FRAME_ORIGIN + c]
         B.wide[w, REFERENCE_NORMAL + c] = B.wide[w, PLANE_NORMAL + c]
@@ -284,7 +284,7 @@ def store_reference_plane(B, w, still):
 
 @formula
 def envelope_reaches_plane(B, w, s):
-    """Whether the envelope of slot s comes below the plane of a wide shape."""
+    """Whether the envelope of slot s reaches below the plane of a wide shape."""
     x, gap, lead = B.wide, 0.0, 0.0
     far, turns = 0.0, 0.0
     for c in range(3):
@@ -303,13 +303,13 @@ def envelope_reaches_plane(B, w, s):
 FRAME_STARTS, FRAME_STOPS = (
     0.6,
     0.4,
-)  # squared common velocity over mean square: above, the frame goes along; below, it stops
-SLOWEST_FRAME = 0.5  # but not where an envelope reaches less far ahead than this, in skins
+)  # squared common velocity over mean square velocity: above, the frame moves; below, it stops
+SLOWEST_FRAME = 0.5  # smallest displacement of the frame over an envelope's steps, in skins
 
 
 @formula
 def set_frame(M, B):
-    """The first mover with a number that is none, or -1; whether all move together, and then the frame's velocity."""
+    """Choose the frame's velocity: moving if all movers move together. Returns the first nonfinite mover, or -1."""
     v, v2, n = (0.0, 0.0, 0.0), 0.0, 1.0 * M.pose.shape[0]
     for m in range(M.pose.shape[0]):
         total = 0.0
@@ -324,7 +324,7 @@ def set_frame(M, B):
         v2 += a * a + b * b + c * c
     mean2 = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / max(1.0, n)  # n times the square of the mean velocity
     goes = n > 1.0 and mean2 > (FRAME_STARTS if B.count[FRAME_MOVES] == 0 else FRAME_STOPS) * v2
-    for s in range(B.count[BOUNDED] + B.count[WIDE]):  # what stands may stop what moves past the frame
+    for s in range(B.count[BOUNDED] + B.count[WIDE]):  # fixed shapes may stop movers
         goes = goes and B.slot[s, SLOT_MOVER] >= 0
     slow = SLOWEST_FRAME * B.real[SKIN] * B.real[TYPICAL_RADIUS]
     goes = goes and mean2 * (ENVELOPE_STEPS * B.real[AHEAD]) ** 2 > n * slow * slow
@@ -336,7 +336,7 @@ def set_frame(M, B):
 
 @formula
 def advance_frame(B, n, displacement):
-    """Where the frame goes with the next search: as far as all n shapes did now, and what it lags behind.
+    """Compute the frame's displacement for the next search: the mean displacement of all n shapes, plus the lag.
 
     ``displacement`` is the sum of their displacements since the last search.
     """
@@ -350,9 +350,9 @@ def advance_frame(B, n, displacement):
 
 @formula
 def update_slots(G, M, B):
-    """Bring all up to now; slots that have left their envelopes go to ``moved``, marked.
+    """Update all slots; those that have left their envelopes are marked and listed in ``moved``.
 
-    Returns how many shapes can move, and the sum of their displacements.
+    Returns the number of movable shapes, and the sum of their displacements.
     """
     moved, n, way = 0, 0.0, (0.0, 0.0, 0.0)
     now = B.now

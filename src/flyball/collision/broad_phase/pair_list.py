@@ -47,12 +47,12 @@ from .workspace import (
     WIDE,
 )
 
-LONG_ENVELOPE = 0.5  # an envelope longer than this, in radii, is looked at as a capsule
+LONG_ENVELOPE = 0.5  # envelopes longer than this, relative to the radius, are tested as capsules
 
 
 @formula
 def is_excluded(excluded, a, b):
-    """Whether the pair of movers stands in a sorted list of pairs, the smaller first."""
+    """Whether the pair of movers is in a sorted list of pairs, the smaller first."""
     if a > b:
         a, b = b, a
     low, high = 0, excluded.shape[0]
@@ -67,9 +67,9 @@ def is_excluded(excluded, a, b):
 
 @formula
 def may_touch(G, B, s, t):
-    """Whether the shapes of two slots may touch at all."""
+    """Whether the shapes of two slots may collide at all."""
     a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
-    if a == b:  # the same mover, or both stand still
+    if a == b:  # the same mover, or both fixed
         return False
     if B.count[CLASSES_EXACT] == 0:
         i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
@@ -80,9 +80,9 @@ def may_touch(G, B, s, t):
 
 @formula
 def squared_axis_distance(fat, s, t, x, y, z):
-    """Squared distance of the lines of two envelopes; (x, y, z) from the middle of s to that of t.
+    """Squared distance of the axes of two envelopes; (x, y, z) from the middle of s to that of t.
 
-    The parameters are found in turn, as for two segments (Ericson 2005, 5.1.9).
+    The parameters are found alternately, as for two segments (Ericson 2005, 5.1.9).
     """
     a, b = (fat[s, 3], fat[s, 4], fat[s, 5]), (fat[t, 3], fat[t, 4], fat[t, 5])
     aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
@@ -90,7 +90,7 @@ def squared_axis_distance(fat, s, t, x, y, z):
     ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     ax, bx = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
     det = aa * bb - ab * ab
-    p = 0.0  # place on the line of s, in [-1, 1]
+    p = 0.0  # parameter on the axis of s, in [-1, 1]
     if det > 1e-12 * aa * bb:
         p = min(1.0, max(-1.0, (ax * bb - bx * ab) / det))
     q = 0.0
@@ -98,7 +98,7 @@ def squared_axis_distance(fat, s, t, x, y, z):
         q = min(1.0, max(-1.0, (p * ab - bx) / bb))
     if aa > 0.0:
         p = min(1.0, max(-1.0, (ax + q * ab) / aa))
-    if det <= 1e-12 * aa * bb and bb > 0.0:  # side by side: once more
+    if det <= 1e-12 * aa * bb and bb > 0.0:  # parallel: one more iteration
         q = min(1.0, max(-1.0, (p * ab - bx) / bb))
         if aa > 0.0:
             p = min(1.0, max(-1.0, (ax + q * ab) / aa))
@@ -108,7 +108,7 @@ def squared_axis_distance(fat, s, t, x, y, z):
 
 @formula
 def envelopes_meet(B, s, t):
-    """Whether the envelopes of two bounded slots meet."""
+    """Whether the envelopes of two bounded slots overlap."""
     fat = B.envelope
     x = fat[t, MIDDLE] - fat[s, MIDDLE]
     y = fat[t, MIDDLE + 1] - fat[s, MIDDLE + 1]
@@ -123,12 +123,12 @@ def envelopes_meet(B, s, t):
 
 
 SUCCEEDING_SLOTS, ALL_SLOTS, UNVISITED_SLOTS = range(3)
-"""Which partners are taken: those that come later in order, all, or all but moved ones that come earlier."""
+"""Accepted partners: those later in order, all, or all but moved ones that come earlier."""
 
 
 @formula
 def add_pair(G, B, s, t):
-    """Put two slots into the list: whether there was room."""
+    """Add two slots to the list; returns whether the table was large enough."""
     n = B.count[PAIRS_IN_LIST]
     if n >= B.pair.shape[0]:
         return False
@@ -149,7 +149,7 @@ def add_pair(G, B, s, t):
 
 @formula
 def add_from_cell(G, B, s, t, key, which):
-    """Offer all of one place that stand in the cell ``key``; ``t`` is the first."""
+    """Add partners from the cell ``key``; ``t`` is the first slot of its bucket."""
     compared = 0
     while t >= 0:
         if B.key[t] == key and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
@@ -163,7 +163,7 @@ def add_from_cell(G, B, s, t, key, which):
 
 @formula
 def add_from_level(G, B, s, l, which):
-    """Offer all of level l, one by one."""
+    """Add partners from level l, by testing every slot."""
     for t in range(B.count[BOUNDED]):
         if B.slot[t, SLOT_LEVEL] == l and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
             B.count[PAIRS_COMPARED] += 1
@@ -174,7 +174,7 @@ def add_from_level(G, B, s, l, which):
 
 @formula
 def add_neighbours(G, B, s, l, which):
-    """Offer the partners of slot s at level l: whether there was room."""
+    """Add the partners of slot s at level l; returns whether the table was large enough."""
     first, last, many = neighbour_cells(B, s, l)
     if which != SUCCEEDING_SLOTS and scan_is_cheaper(B, many):
         return add_from_level(G, B, s, l, which)
@@ -201,7 +201,7 @@ def add_neighbours(G, B, s, l, which):
 
 @formula
 def add_plane_pairs(G, B, w):
-    """Offer the partners of a wide slot: whether there was room."""
+    """Add the partners of a wide slot; returns whether the table was large enough."""
     of = B.slot[w, SLOT_CLASS]
     store_reference_plane(B, w - B.count[BOUNDED], B.slot[w, SLOT_MOVER] < 0)
     for s in range(B.count[BOUNDED]):
@@ -213,7 +213,7 @@ def add_plane_pairs(G, B, w):
 
 @formula
 def list_all(G, B):
-    """All pairs, in the order of the slots: whether there was room."""
+    """List all pairs, in the order of the slots; returns whether the table was large enough."""
     B.count[PAIRS_IN_LIST] = 0
     for s in range(B.count[BOUNDED]):
         own = B.slot[s, SLOT_LEVEL]
@@ -231,7 +231,7 @@ def list_all(G, B):
 
 @formula
 def drop_moved(B):
-    """Take the pairs of marked slots off the list, and keep in the table which contacts they had."""
+    """Remove pairs of marked slots from the list, and store their contacts in the hash table."""
     n, half = 0, B.count[CURRENT_HALF]
     for k in range(B.count[PAIRS_IN_LIST]):
         s, t, first = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.seen[half, k] + 0  # all integers of one type
@@ -246,7 +246,7 @@ def drop_moved(B):
 
 @formula
 def renew_envelope(B, s):
-    """Another envelope for slot s, in its cell: whether a level takes it."""
+    """Compute a new envelope of slot s and insert it into its cell; returns whether a level fits."""
     i = B.slot[s, SLOT_SHAPE]
     for c in range(8):
         B.raw[i, c] = B.now[s, c]
@@ -266,7 +266,7 @@ def renew_envelope(B, s):
 
 @formula
 def list_moved(G, B):
-    """The pairs of shapes that have left their envelopes, at the end of the list: whether there was room."""
+    """Append the pairs of shapes that have left their envelopes; returns whether the table was large enough."""
     wide = B.count[BOUNDED]
     for k in range(B.count[MOVED_SLOTS]):
         s = B.moved[k]

@@ -1,6 +1,6 @@
-"""Narrow phase: contacts of one pair of shapes. Nothing here is kept from step to step.
+"""Narrow phase: contacts of one pair of shapes. No data are kept from step to step.
 
-`dispatch` chooses the formula of a pair: one of `special_pairs`, else the generic way of `distance` (GJK in
-`gjk`, EPA in `epa`), followed by clipping of the facing faces in `manifold`. The search calls it by address, so that
-an edit of a pair leaves the search compiled, and a pile of spheres never compiles it.
+`dispatch` selects the formula of a pair: one of `special_pairs`, otherwise the generic algorithm of `distance` (GJK in
+`gjk`, EPA in `epa`), followed by clipping of the facing faces in `manifold`. The search calls the narrow phase by
+address, so that a change of a pair does not recompile the search, and spheres alone never compile it.
 """

@@ -1,9 +1,9 @@
 """Dispatch of the narrow phase: the formula for a pair of kinds, and the kernels that the contact search calls.
 
 The list of special pairs comes from the files of `special_pairs`; any other pair is a generic convex pair
-(`distance`). Kernels are compiled apart from the search, in variants for fewer kinds, so that shapes that do
-not occur are not compiled. A kernel writes the contacts of the two shapes named in its workspace into
-`Search.room`, and returns how many there are.
+(`distance`). Kernels are compiled separately from the search, in variants for fewer kinds, so that shapes that do
+not occur are not compiled. A kernel writes the contacts of the two shapes named in its workspace to
+`Search.room`, and returns their number.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ALL_KINDS = {kind for pair in PAIR_FORMULAS for kind in pair}
 
 
 def _by_kinds(name, kinds, otherwise):
-    """The formula that chooses among the pairs of these kinds."""
+    """Generate the formula that selects the contact formula of a pair of kinds."""
     names, lines = {"any_pair": generic_pair}, []
     for number, pair in enumerate(sorted(PAIR_FORMULAS, key=lambda p: (p[1] is None, p))):
         if pair[0] in kinds and (pair[1] is None or pair[1] in kinds):
@@ -40,7 +40,7 @@ _by_kinds_planar = _by_kinds("by_kinds_planar", PLANAR, "0")
 
 @formula
 def shape_pose(G, M, i):
-    """Where a shape's origin is, and its axes (rows take its components to the world's)."""
+    """Origin of a shape, and its axes (rows convert its components to the world's)."""
     m = G.shape_i[i, MOVER]
     p, R = load3(G.shape_x, i, PLACE), load9(G.shape_x, i, AXES)
     if m < 0:
@@ -51,7 +51,7 @@ def shape_pose(G, M, i):
 
 @formula
 def _collide_by(by_kinds, G, M, i, j, reach, scratch):
-    """Contacts of two shapes by a choice among pairs."""
+    """Find contacts of two shapes with a formula that selects by kind."""
     a, b = G.shape_i[i, KIND], G.shape_i[j, KIND]
     turned = a > b
     if turned:
@@ -59,7 +59,7 @@ def _collide_by(by_kinds, G, M, i, j, reach, scratch):
     p, R = shape_pose(G, M, i)
     q, Q = shape_pose(G, M, j)
     d = sub(q, p)
-    if not dot(d, d) < inf:  # what is no number touches nothing
+    if not dot(d, d) < inf:  # nan
         return 0
     count = by_kinds(a, b, G, i, j, ((0.0, 0.0, 0.0), R), (d, Q), reach, scratch)
     for k in range(count):
@@ -72,10 +72,10 @@ def _collide_by(by_kinds, G, M, i, j, reach, scratch):
 
 @formula
 def collide(G, M, i, j, reach, scratch):
-    """Contacts of shapes i and j: how many were written into the first rows of ``scratch``.
+    """Find contacts of shapes i and j; writes them to the first rows of ``scratch`` and returns their number.
 
-    A row is a point midway between the surfaces, the unit normal from i to j, the gap and the feature, a whole number
-    that tells the points of this pair apart and lasts. Points whose gap is above ``reach`` are no contacts.
+    A row is a point midway between the surfaces, the unit normal from i to j, the gap and the feature: a whole number
+    that identifies the points of this pair from step to step. Points with a gap above ``reach`` are omitted.
 
     Parameters
     ----------
@@ -85,50 +85,50 @@ def collide(G, M, i, j, reach, scratch):
         Two shapes.
     reach : float
         Largest gap [m].
-    scratch : array (ROOM, 8)
-        Contacts come first; the rest is scratch (``room.py``).
+    scratch : array (SCRATCH_ROWS, 8)
+        Contacts come first; the rest is scratch (`primitives`).
     """
     return _collide_by(_by_kinds_all, G, M, i, j, reach, scratch)
 
 
 @formula
 def collide_planar(G, M, i, j, reach, scratch):
-    """As `collide`, for the kinds of planar mechanisms only: a third of it to compile."""
+    """Find contacts as `collide`, for the kinds of planar mechanisms only; compiles in a third of the time."""
     return _collide_by(_by_kinds_planar, G, M, i, j, reach, scratch)
 
 
 @formula
 def collide_convex(G, M, i, j, reach, scratch):
-    """As `collide`, where no height fields are: three quarters of it to compile."""
+    """Find contacts as `collide`, without height fields; compiles in three quarters of the time."""
     return _collide_by(_by_kinds_convex, G, M, i, j, reach, scratch)
 
 
 @kernel
 def between(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
-    """Of any kind."""
+    """Contacts of shapes of any kind."""
     return collide(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
 
 
 @kernel
 def between_convex(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
-    """Of convex kinds."""
+    """Contacts of convex shapes."""
     return collide_convex(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
 
 
 @kernel
 def between_planar(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
-    """Of the kinds of planar mechanisms."""
+    """Contacts of shapes of planar mechanisms."""
     return collide_planar(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
 
 
 @kernel
 def no_pair_contacts(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
-    """No contacts: stands for `between` where no pair asks for it."""
+    """Return no contacts; used in place of `between` if no pair needs it."""
     return 0
 
 
 def kernel_for_kinds(kinds: set[int]) -> Kernel:
-    """The one to compile for shapes of these kinds."""
+    """Kernel to compile for shapes of these kinds."""
     if kinds <= PLANAR:
         return between_planar
     return between if FIELD in kinds else between_convex

@@ -1,10 +1,10 @@
 """Signed distance of two convex shapes, in space and in the plane, and the contacts of a generic convex pair.
 
-Separate cores: GJK. Where cores touch or overlap, the separation along a direction n is improved from outside:
-shape 2 is moved away along n until there is a clear gap, and the nearest points then give a direction that
+Separate cores: GJK. If cores touch or overlap, the separation along a direction n is improved iteratively:
+shape 2 is moved away along n until there is a clear gap; the nearest points then give a direction that
 separates at least as well (the origin is projected on the difference of both from a point beyond its surface;
-equality is a local optimum). A few such steps settle shallow overlaps to rounding, for curved shapes too; for
-deep overlaps the polytope of `epa` gives the start.
+equality is a local optimum). A few such steps solve shallow overlaps to rounding, for curved shapes too; for
+deep overlaps the polytope of `epa` gives the initial direction.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .primitives import SIMPLEX
 
 @formula
 def edge_normal(G, a, b):
-    """Unit normal of the side from vertex a to vertex b, and its length; 0 where both are one point."""
+    """Return the unit normal of the side from vertex a to vertex b, and its length; 0 if both coincide."""
     x, y = G.vertex[b, 0] - G.vertex[a, 0], G.vertex[b, 1] - G.vertex[a, 1]
     length = sqrt(x * x + y * y)
     if not length > 0.0:
@@ -66,7 +66,7 @@ def point_polygon_distance(G, i, c):
 
 @formula
 def edge_separation(G, i, j, p, R):
-    """Largest separation along a side's normal of polygon i, that normal; j at p, R in i's axes."""
+    """Largest separation along a side's normal of polygon i, and that normal; j has pose (p, R) in i's axes."""
     first, count = G.shape_i[i, FIRST], G.shape_i[i, COUNT]
     far, n, a = -inf, (1.0, 0.0, 0.0), first + count - 1
     for b in range(first, first + count):
@@ -82,7 +82,7 @@ def edge_separation(G, i, j, p, R):
 
 @formula
 def nearest_vertex(G, i, j, p, R):
-    """Distance of the corner of polygon j that is nearest to polygon i, unit vector to it, both nearest points."""
+    """Distance of the corner of polygon j nearest to polygon i, unit vector to it, both nearest points."""
     first = G.shape_i[j, FIRST]
     far, n, x, y = inf, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(first, first + G.shape_i[j, COUNT]):
@@ -95,7 +95,7 @@ def nearest_vertex(G, i, j, p, R):
 
 @formula
 def polygon_separation(G, i, j, A, B, prefer):
-    """Largest separation of the cores of two polygons at A and B along a side's normal, and that, from i to j."""
+    """Largest separation of the cores of two polygons at A and B along a side's normal, and the normal from i to j."""
     C = mm(transpose(A[1]), B[1])
     far, n = edge_separation(G, i, j, mtv(A[1], sub(B[0], A[0])), C)
     n = mv(A[1], n)
@@ -105,7 +105,7 @@ def polygon_separation(G, i, j, A, B, prefer):
 
 @formula
 def polygon_distance(G, i, j, A, B, prefer):
-    """Distance of the cores of two polygons that do not overlap, unit normal from i to j, a point midway between."""
+    """Distance of the cores of two separate polygons, unit normal from i to j, a point midway between."""
     C = mm(transpose(A[1]), B[1])
     far, d, x, y = nearest_vertex(G, i, j, mtv(A[1], sub(B[0], A[0])), C)
     s, m, u, v = nearest_vertex(G, j, i, mtv(B[1], sub(A[0], B[0])), transpose(C))
@@ -114,20 +114,20 @@ def polygon_distance(G, i, j, A, B, prefer):
     return far, mv(A[1], d), add(A[0], mv(A[1], scale(0.5, add(x, y))))
 
 
-OFFSET = 0.03  # of the size: the gap that is made
-MAX_LOOKS = 48  # at most
-SMALLEST_OFFSET = 1e-6  # of the size: the least
-NO_PROGRESS = 1e-13  # of the size: what one more look brings when it was the last
-SHALLOW = 1e-8  # of the size: depth below which nobody asks whether another direction is less deep
-MAX_DOUBLINGS = 10  # doublings
-PROBE_ANGLE = 1e-3  # angle
-LOOKS_BEFORE_EPA = 4  # of these, before the polytope is asked
+OFFSET = 0.03  # relative to the size; gap that is made
+MAX_LOOKS = 48  # maximum number of iterations
+SMALLEST_OFFSET = 1e-6  # relative to the size; smallest gap
+NO_PROGRESS = 1e-13  # relative to the size; smaller improvements end the iteration
+SHALLOW = 1e-8  # relative to the size; for smaller depths no other direction is tried
+MAX_DOUBLINGS = 10  # maximum number of doublings
+PROBE_ANGLE = 1e-3  # angle [rad] of trial directions
+LOOKS_BEFORE_EPA = 4  # iterations before the polytope is used
 DISTANCE_ROWS = 8 + POLYTOPE  # of scratch
 
 
 @formula
 def extend_step(G, i, j, p, R, scratch, s, n, d):
-    """From n, a step to d made the separation s; go on that way in doubled steps while it grows."""
+    """Continue a step from n to d, with separation s, in doubled steps while the separation grows."""
     step = sub(d, n)
     best = d
     for _k in range(MAX_DOUBLINGS):
@@ -143,7 +143,7 @@ def extend_step(G, i, j, p, R, scratch, s, n, d):
 
 @formula
 def probe_neighbours(G, i, j, p, R, scratch, s, n):
-    """The better of n, with the separation s, and what lies to its sides: a saddle has no other way to be left."""
+    """Compare n, with separation s, with directions beside it, to leave saddle points; returns the better one."""
     best = n
     for k in range(4):
         u = contact_frame(n)[k // 2]
@@ -159,8 +159,8 @@ def probe_neighbours(G, i, j, p, R, scratch, s, n):
 def core_separation(G, i, j, p, R, start, far, scratch, at):
     """Separation of the cores, direction from 1 to 2, point of core 1; all in the axes of shape 1.
 
-    Above ``far`` the separation is only a bound from below, and the point is none. The nearest point of core 2 is the
-    point of core 1 plus separation times direction. ``start``, not all zeros, is a guess of the direction.
+    Above ``far`` the separation is only a lower bound, and the point is invalid. The nearest point of core 2 is the
+    point of core 1 plus separation times direction. ``start``, not all zeros, is an initial direction.
     """
     best, n, size, corners, asked = -1e300, start, 0.0, 0, False
     a, away, limit = p, 0.0, far
@@ -211,7 +211,7 @@ def signed_distance(G, i, j, A, B, reach, scratch):
 
 @formula
 def generic_pair(G, i, j, A, B, reach, scratch):
-    """Where they are nearest, then the faces that meet there: see ``pairs.registry``."""
+    """Contacts of a generic pair: the nearest points, then the facing faces; see `special_pairs.registry`."""
     gap, n, p = signed_distance(G, i, j, A, B, reach, scratch)
     if not gap <= reach:
         return 0

@@ -1,9 +1,9 @@
 """Penetration depth of two convex cores by the expanding polytope algorithm (Van den Bergen 2001).
 
 A polytope inside the difference of the cores is expanded where it is nearest to the origin. Its nearest face
-bounds the depth from below, the support along any face's normal from above; where both meet, the depth is the
-smallest there is. The polytope is a closed set of directed edges whatever rounding does: faces that see the new
-corner are removed, their edges without counterpart become new faces.
+bounds the depth from below, the support along any face's normal from above; when both bounds meet, the depth is the
+smallest one. The polytope is a closed set of directed edges in spite of rounding: faces that are visible from the new
+corner are removed, and their edges without counterpart form new faces.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from ...math.scalar import absolute, sqrt
 from ...math.vec import cross, dot, load3, neg, scale, store3, sub
 from .gjk import difference_support
 
-POLYTOPE_CORNERS = 96  # corners of the polytope at most
+POLYTOPE_CORNERS = 96  # maximum corners of the polytope
 POLYTOPE_FACES = 2 * POLYTOPE_CORNERS
-HORIZON_EDGES = 96  # edges around what a new corner sees, at most
+HORIZON_EDGES = 96  # maximum edges of the horizon of a new corner
 POLYTOPE_ROWS = POLYTOPE_CORNERS + POLYTOPE_FACES + HORIZON_EDGES  # of scratch
-THIN = 1e-12  # of the size: what counts as no thickness, no progress
-NEAR = 1e-7  # of the depth, by which the smallest may be missed
+THIN = 1e-12  # relative to the size; smaller thickness or progress counts as zero
+NEAR = 1e-7  # relative accuracy of the depth
 A, B, C, DISTANCE, NX = 0, 1, 2, 3, 4  # columns of a face
 
 
 @formula
 def write_face(scratch, at, f, a, b, c):
-    """Write face f (corners counter-clockwise from outside). One without area is never the nearest."""
+    """Write face f (corners counter-clockwise seen from outside). A face without area is never the nearest."""
     x = load3(scratch, at + a, 0)
     ab, ac = sub(load3(scratch, at + b, 0), x), sub(load3(scratch, at + c, 0), x)
     n = cross(ab, ac)
@@ -40,7 +40,7 @@ def write_face(scratch, at, f, a, b, c):
 
 @formula
 def perpendicular_direction(scratch, at, count, turn):
-    """A direction at right angles to the first ``count`` (1 to 3) corners; ``turn`` 0 to 5 chooses."""
+    """Direction perpendicular to the first ``count`` (1 to 3) corners; ``turn`` 0 to 5 selects one."""
     if count == 1:
         s = 1.0 if turn < 3 else -1.0
         return (s if turn % 3 == 0 else 0.0, s if turn % 3 == 1 else 0.0, s if turn % 3 == 2 else 0.0)
@@ -62,7 +62,7 @@ def perpendicular_direction(scratch, at, count, turn):
 
 @formula
 def complete_tetrahedron(G, i, j, p, R, scratch, at, count, size, best, along):
-    """Add corners until there are four; how many there are, and the best direction met."""
+    """Add corners until there are four; returns their number, and the best separation and direction found."""
     while count < 4:
         thick, taken = THIN * size, (0.0, 0.0, 0.0)
         for turn in range(6 if count < 3 else 2):
@@ -88,7 +88,7 @@ def complete_tetrahedron(G, i, j, p, R, scratch, at, count, size, best, along):
 
 @formula
 def write_tetrahedron(scratch, at):
-    """The four faces of the first tetrahedron, outside counter-clockwise."""
+    """Write the four faces of the first tetrahedron, counter-clockwise seen from outside."""
     a = load3(scratch, at, 0)
     e = sub(load3(scratch, at + 3, 0), a)
     inner = dot(cross(sub(load3(scratch, at + 1, 0), a), sub(load3(scratch, at + 2, 0), a)), e) > 0.0
@@ -101,7 +101,7 @@ def write_tetrahedron(scratch, at):
 
 @formula
 def add_corner(scratch, at, faces, corner, thin):
-    """Let the polytope have a further corner; how many faces there are then, or -1: no room."""
+    """Add a corner to the polytope; returns the number of faces, or -1 if there are too many."""
     x = load3(scratch, at + corner, 0)
     edge = at + POLYTOPE_CORNERS + POLYTOPE_FACES
     edges, f = 0, 0
@@ -136,11 +136,11 @@ def add_corner(scratch, at, faces, corner, thin):
 
 @formula
 def penetration_depth(G, i, j, p, R, scratch, at, count, size, best, along):
-    """Separation (less than zero: the depth) and its direction from 1 to 2, of cores whose difference holds the origin.
+    """Separation (negative: depth) and its direction from 1 to 2, for cores whose difference contains the origin.
 
-    Rows from ``at`` hold ``count`` (at most 4) corners of the difference, and are scratch (`POLYTOPE_ROWS`). ``best`` and
-    ``along`` are a separation and direction known before; the depth found is larger by no more than `NEAR` of itself
-    than the smallest, where `POLYTOPE_CORNERS` suffice.
+    Rows from ``at`` hold ``count`` (at most 4) corners of the difference, and are scratch (`POLYTOPE_ROWS`). ``best``
+    and ``along`` are a separation and direction known before. The depth found exceeds the smallest by at most the
+    relative error `NEAR`, if `POLYTOPE_CORNERS` suffice.
     """
     count, best, along = complete_tetrahedron(G, i, j, p, R, scratch, at, count, size, best, along)
     if count < 4:

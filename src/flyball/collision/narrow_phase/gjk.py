@@ -1,13 +1,13 @@
 """Distance of two convex cores by their support functions (Gilbert, Johnson and Keerthi 1988).
 
 A direction n, from 1 to 2, separates the cores by ``s(n) = -max over 1 of n.x + min over 2 of n.x``; the
-distance is the largest s. Every step knows s of its direction, a lower bound, and a point of the difference of
+distance is the largest s. Every step has s of its direction, a lower bound, and a point of the difference of
 both cores whose length is an upper bound. The search ends when the bounds meet, when a step makes no progress
 (rounding), or after `MAX_STEPS`.
 
 The nearest point of a simplex: Ericson, *Real-Time Collision Detection* (2005), 5.1; in the plane of a triangle
-it is taken along the normal, which keeps its direction close to the origin. Corners are rows of the scratch,
-coordinates in columns 0 to 2, the newest last.
+it is computed along the normal, which keeps its direction accurate close to the origin. Corners are rows of the
+scratch, coordinates in columns 0 to 2, the newest last.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .primitives import FIELD_TRIANGLE
 
 @formula
 def core_support(G, i, scratch, d):
-    """The point of the core of shape i that is farthest along d, in its axes."""
+    """Point of the core of shape i farthest along d, in its axes."""
     kind = G.shape_i[i, KIND]
     if kind != FIELD:
         return support(kind, G, i, d)
@@ -35,12 +35,12 @@ def core_support(G, i, scratch, d):
     return best
 
 
-DEGENERATE = 1e-26  # square of a sine below which three points are on a line, four in a plane
+DEGENERATE = 1e-26  # squared sine below which three points are on a line, four in a plane
 
 
 @formula
 def nearest_on_line(a, b):
-    """Nearest point of the line from a to b and the weights of both."""
+    """Nearest point to the origin of the segment from a to b, and the weights of both."""
     e = sub(b, a)
     ee = dot(e, e)
     t = -dot(a, e)
@@ -54,7 +54,7 @@ def nearest_on_line(a, b):
 
 @formula
 def nearest_on_edges(a, b, c):
-    """Nearest point of the three edges."""
+    """Nearest point to the origin of three edges, and the weights of the corners."""
     v, w = nearest_on_line(a, b)
     for k in range(2):
         x, u = nearest_on_line(a if k == 0 else b, c)
@@ -65,7 +65,7 @@ def nearest_on_edges(a, b, c):
 
 @formula
 def nearest_on_triangle(a, b, c):
-    """Nearest point of a triangle and the weights of its corners."""
+    """Nearest point to the origin of a triangle, and the weights of its corners."""
     ab, ac = sub(b, a), sub(c, a)
     n = cross(ab, ac)
     nn = dot(n, n)
@@ -80,9 +80,9 @@ def nearest_on_triangle(a, b, c):
 
 @formula
 def nearest_on_tetrahedron(scratch, at):
-    """Nearest point of a tetrahedron, weights of its corners, and whether the origin is inside.
+    """Nearest point to the origin of a tetrahedron, weights of its corners, and whether the origin is inside.
 
-    The origin is known to be on the inner side of the face that the newest corner does not belong to.
+    The origin must be on the inner side of the face opposite to the newest corner.
     """
     v, w, least, inside = (0.0, 0.0, 0.0), (0.25, 0.25, 0.25, 0.25), -1.0, True
     c = load3(scratch, at + 3, 0)
@@ -109,7 +109,7 @@ def nearest_on_tetrahedron(scratch, at):
 
 @formula
 def nearest_on_simplex(scratch, at, count):
-    """Nearest point of the first ``count`` rows from ``at``, the weights of four rows, whether the origin is inside."""
+    """Nearest point of the first ``count`` rows from ``at``, weights of four rows, whether the origin is inside."""
     a = load3(scratch, at, 0)
     if count == 4:
         return nearest_on_tetrahedron(scratch, at)
@@ -123,15 +123,15 @@ def nearest_on_simplex(scratch, at, count):
     return v, (w[0], w[1], w[2], 0.0), False
 
 
-MAX_STEPS = 128  # steps
-BOUND_TOLERANCE = 1e-14  # of the size: bounds that have met
-SMALLEST_DISTANCE = 1e-7  # of the size: distance below which the direction of the nearest points says too little
-SEPARATE, BEYOND_REACH, OVERLAPPING = range(3)  # found; further apart than asked; they touch or overlap
+MAX_STEPS = 128  # maximum number of steps
+BOUND_TOLERANCE = 1e-14  # relative to the size; difference of bounds at convergence
+SMALLEST_DISTANCE = 1e-7  # relative to the size; below it the direction of the nearest points is inaccurate
+SEPARATE, BEYOND_REACH, OVERLAPPING = range(3)  # found; farther apart than requested; touching or overlapping
 
 
 @formula
 def difference_support(G, i, j, p, R, scratch, d):
-    """Farthest points along d: of core 1, and of the difference 1 - 2."""
+    """Farthest points along d of core 1, and of the difference 1 - 2."""
     a = core_support(G, i, scratch, d)
     b = core_support(G, j, scratch, neg(mtv(R, d)))
     return a, sub(a, add(p, mv(R, b)))
@@ -139,7 +139,7 @@ def difference_support(G, i, j, p, R, scratch, d):
 
 @formula
 def drop_unused_corners(scratch, at, count, w):
-    """Drop the corners without weight; those that are left and how many."""
+    """Remove the corners without weight; returns the number of remaining ones."""
     n = 0
     for k in range(count):
         if w[k] > 0.0:
@@ -152,24 +152,24 @@ def drop_unused_corners(scratch, at, count, w):
 
 @formula
 def core_distance(G, i, j, p, R, start, far, scratch, at):
-    """Status, separation, its direction from 1 to 2, size of the difference, corners of the simplex left at ``at``.
+    """Status, separation, its direction from 1 to 2, size of the difference, number of corners of the simplex.
 
     Parameters
     ----------
     i, j : int
         The shapes.
     p, R
-        Pose of shape 2 in the axes of shape 1, which everything is in.
+        Pose of shape 2 in the axes of shape 1, in which everything is expressed.
     start : tuple
-        Direction from 1 to 2 to begin with, not all zeros.
+        Initial direction from 1 to 2, not all zeros.
     far : float
-        Separation [m] that is enough: a larger one is not found out.
-    room, at
-        Scratch: rows ``at`` to ``at + 4`` take corners of the simplex: the difference, the point of core 1, the weight.
+        Separation [m] at which the search stops: a larger one is not computed.
+    scratch, at
+        Scratch: rows ``at`` to ``at + 4`` hold corners of the simplex: the difference, the point of core 1, the weight.
 
     Notes
     -----
-    Where the cores overlap the separation is the largest s met (less than zero), a bound of the depth from above.
+    If the cores overlap the separation is the largest s found (negative), a bound of the depth from above.
     """
     d, best, along, size, count, vv = start, -1e300, start, 0.0, 0, 1e300
     for _step in range(MAX_STEPS):
@@ -204,7 +204,7 @@ def core_distance(G, i, j, p, R, start, far, scratch, at):
 
 @formula
 def point_of_simplex(scratch, at, count):
-    """The point of core 1 that the simplex found stands for."""
+    """Point of core 1 for the nearest point of the simplex."""
     x = (0.0, 0.0, 0.0)
     for k in range(count):
         x = add(x, scale(scratch[at + k, 6], load3(scratch, at + k, 3)))

@@ -1,11 +1,11 @@
 """Contact manifold of two facing faces: one is clipped by the other; at most four points remain.
 
 Both faces are expressed in a frame whose third axis is the normal n from shape 1 to shape 2: a corner has a
-place (x, y) and a height z. Over each point of the overlap the gap is the difference of the heights, so faces
+position (x, y) and a height z. Over each point of the overlap the gap is the difference of the heights, so faces
 need not be perpendicular to the normal: the edge of a box over the edge of another gives the point where they
-cross, and further points only where these are near too.
+cross, and further points only if these are close too.
 
-Clipping: Sutherland and Hodgman 1974. A corner keeps the number of the edge that leaves it: the face's own
+Clipping: Sutherland and Hodgman 1974. A corner stores the number of the edge that starts there: the face's own
 edges are 0, 1, ..., those of the other face follow from `MAX_CORNERS` on. The two edges that meet in a point
 are its feature.
 """
@@ -21,16 +21,16 @@ from ..shapes.registry import face, radius
 from ..tables import KIND, RADIUS
 from .primitives import CLIPPED_1, CLIPPED_2, FACE_1, FACE_2, MAX_CORNERS
 
-X, Y, Z, EDGE, DEPTH = range(5)  # columns: place, height, edge to the next corner, gap
-CLIP_TOLERANCE = 1e-6  # part of an edge's length that corners may be beyond it and stay: equal boxes on each other
-STEEPEST = 0.1  # a face or line is not used where the cosine of its lean against the plane square to the normal is less
-POINT_TOLERANCE = 1e-9  # parts of a line that are as good as a point
-PARALLEL_ANGLE = 3e-3  # lines are as one where they differ by less [rad]
+X, Y, Z, EDGE, DEPTH = range(5)  # columns: position, height, edge to the next corner, gap
+CLIP_TOLERANCE = 1e-6  # relative to the edge; corners closer beyond it stay: equal boxes on each other
+STEEPEST = 0.1  # smallest cosine of the tilt of a face or line against the plane perpendicular to the normal
+POINT_TOLERANCE = 1e-9  # relative to a line; a shorter part is a point
+PARALLEL_ANGLE = 3e-3  # angle [rad] below which lines are treated as parallel
 
 
 @formula
 def face_slope(scratch, at, count):
-    """How a face's height grows along x and y, and the cosine of its lean (0: too steep); Newell's normal."""
+    """Slopes of a face's height along x and y, and the cosine of its tilt (0: too steep); Newell's normal."""
     x = y = z = 0.0
     a = at + count - 1
     for b in range(at, at + count):
@@ -46,7 +46,7 @@ def face_slope(scratch, at, count):
 
 @formula
 def interpolate_corner(scratch, a, b, t, to, edge):
-    """Write the point that part t of the way from corner a to corner b."""
+    """Write the point at part t of the line from corner a to corner b."""
     for c in range(3):
         scratch[to, c] = scratch[a, c] + t * (scratch[b, c] - scratch[a, c])
     scratch[to, EDGE] = edge
@@ -54,7 +54,7 @@ def interpolate_corner(scratch, a, b, t, to, edge):
 
 @formula
 def clip_by_edge(scratch, at, count, a, b, turn, edge, to):
-    """What of a face is on the inner side of the edge from a to b: how many corners, written from ``to`` on."""
+    """Clip a face by the edge from a to b; returns the number of corners, written from ``to`` on."""
     x, y = scratch[a, X], scratch[a, Y]
     ex, ey = turn * (scratch[b, X] - x), turn * (scratch[b, Y] - y)
     least = -CLIP_TOLERANCE * (ex * ex + ey * ey)
@@ -63,14 +63,14 @@ def clip_by_edge(scratch, at, count, a, b, turn, edge, to):
     dp = ex * (scratch[p, Y] - y) - ey * (scratch[p, X] - x)
     for k in range(at, at + count):
         dk = ex * (scratch[k, Y] - y) - ey * (scratch[k, X] - x)
-        if dp >= least and dk < least:  # going out
+        if dp >= least and dk < least:  # leaves the inner side
             if dp > 0.0:
                 interpolate_corner(scratch, p, k, dp / (dp - dk), to + kept, edge)
                 kept += 1
             elif kept > 0:
                 scratch[to + kept - 1, EDGE] = edge
         if dk >= least:
-            if dp < least and dk > 0.0:  # coming in
+            if dp < least and dk > 0.0:  # enters the inner side
                 interpolate_corner(scratch, p, k, dp / (dp - dk), to + kept, scratch[p, EDGE])
                 kept += 1
             interpolate_corner(scratch, k, k, 0.0, to + kept, scratch[k, EDGE])
@@ -81,7 +81,7 @@ def clip_by_edge(scratch, at, count, a, b, turn, edge, to):
 
 @formula
 def clip_face(scratch, at, count, tool, corners, turn):
-    """A face cut by all edges of another, which goes round by ``turn`` (1: counter-clockwise): where it is, corners."""
+    """Clip a face by all edges of another with orientation ``turn`` (1: counter-clockwise): place, corners."""
     a = tool + corners - 1
     to = CLIPPED_1
     for b in range(tool, tool + corners):
@@ -94,7 +94,7 @@ def clip_face(scratch, at, count, tool, corners, turn):
 
 @formula
 def write_segment(scratch, at, first, last):
-    """Write a part of a line from ``CUT_1`` on: two corners, one where it is as good as a point, none."""
+    """Write a part of a line from `CLIPPED_1` on; returns the number of corners: two, one if short, or none."""
     if first > last:
         return 0
     interpolate_corner(scratch, at, at + 1, first, CLIPPED_1, 0.0)
@@ -104,7 +104,7 @@ def write_segment(scratch, at, first, last):
 
 @formula
 def clip_segment(scratch, at, tool, corners, turn):
-    """A line cut by all edges of a face: where it is, two corners or none; its ends keep their names."""
+    """Clip a line by all edges of a face: place, two corners or none; its ends keep their features."""
     first, last = 0.0, 1.0
     a = tool + corners - 1
     for b in range(tool, tool + corners):
@@ -125,7 +125,7 @@ def clip_segment(scratch, at, tool, corners, turn):
 
 @formula
 def segment_overlap(scratch, at, other):
-    """What two nearly parallel lines have side by side, and how the other's height grows there: corners, slopes."""
+    """Overlap of two nearly parallel lines, and the slopes of the other one's height: corners, slopes."""
     x, y = scratch[at + 1, X] - scratch[at, X], scratch[at + 1, Y] - scratch[at, Y]
     u, v = scratch[other + 1, X] - scratch[other, X], scratch[other + 1, Y] - scratch[other, Y]
     z, w = scratch[at + 1, Z] - scratch[at, Z], scratch[other + 1, Z] - scratch[other, Z]
@@ -141,22 +141,22 @@ def segment_overlap(scratch, at, other):
     return write_segment(scratch, at, first, last), w / uu * u, w / uu * v
 
 
-SAME_POINT = 1e-6  # gaps and places that differ by less, as part of the smaller shape, are the same
-NEAREST_FEATURE = -1.0  # feature of the point where the shapes are nearest, if the faces do not hold it
-FACE_FEATURES = 4096.0  # names of points of one pair of faces
+SAME_POINT = 1e-6  # relative to the smaller shape; smaller differences of gaps and positions count as none
+NEAREST_FEATURE = -1.0  # feature of the point where the shapes are nearest, if it is not on the faces
+FACE_FEATURES = 4096.0  # range of features of one pair of faces
 FACE_PAIRS = 65536.0
 
 
 @formula
 def contact_frame(n):
-    """Two unit vectors square to the unit vector n, and n."""
+    """Two unit vectors perpendicular to the unit vector n, and n."""
     u, v = axes_across(n)
     return u, v, n
 
 
 @formula
 def face_in_frame(G, i, P, d, frame, scratch, at):
-    """Put the face of shape i at P that faces d into the frame: how many corners, its number."""
+    """Write the face of shape i at P that faces d in the frame; returns the number of corners, and its number."""
     p, R = P
     count, number = face(G.shape_i[i, KIND], G, i, mtv(R, d), scratch, at)
     u, v, n = mtv(R, frame[0]), mtv(R, frame[1]), mtv(R, frame[2])
@@ -170,7 +170,7 @@ def face_in_frame(G, i, P, d, frame, scratch, at):
 
 @formula
 def face_overlap(scratch, m1, m2):
-    """What two faces have in common: where it stands, corners, the other face's first corner and slopes, its side."""
+    """Overlap of two faces: place, corners, the other face's first corner and slopes, its side."""
     if m2 > 2:
         a, b, cosine = face_slope(scratch, FACE_2, m2)
         other, side = FACE_2, 1.0
@@ -192,14 +192,14 @@ def face_overlap(scratch, m1, m2):
 
 @formula
 def corners_coincide(scratch, a, b, same):
-    """Whether two corners are as good as one."""
+    """Whether two corners are at the same position within ``same``."""
     x, y = scratch[a, X] - scratch[b, X], scratch[a, Y] - scratch[b, Y]
     return x * x + y * y <= same * same
 
 
 @formula
 def corner_gaps(scratch, at, count, rounding, limits, plane, first_name):
-    """Gaps of the corners against a face; those within reach move up: how many, the smallest."""
+    """Compute gaps of the corners to a face; those within reach move up. Returns their number, the smallest gap."""
     other, a, b, side = plane
     r1, r2 = rounding
     reach, same = limits
@@ -225,7 +225,7 @@ def corner_gaps(scratch, at, count, rounding, limits, plane, first_name):
 
 @formula
 def is_farther(best, value):
-    """Whether a point is farther than the best so far; where they are equal but for rounding the first one stays."""
+    """Whether a value exceeds the best so far by more than rounding; equal values keep the first point."""
     return value > best + 1e-6 * abs(best)
 
 
@@ -238,7 +238,7 @@ def swap_corners(scratch, a, b):
 
 @formula
 def reduce_to_four(scratch, at, count, same):
-    """The deepest, the one farthest from it, and the farthest to either side of these come first: how many remain."""
+    """Move four corners to the front: the deepest, the farthest from it, the farthest to either side. Returns four."""
     best = at
     for k in range(at + 1, at + count):
         if scratch[k, DEPTH] < scratch[best, DEPTH] - same:
@@ -264,7 +264,7 @@ def reduce_to_four(scratch, at, count, same):
 
 @formula
 def write_contacts(scratch, at, count, frame):
-    """Write corners out as contacts."""
+    """Write corners as contacts."""
     for k in range(count):
         c = at + k
         p = add(scale(scratch[c, X], frame[0]), add(scale(scratch[c, Y], frame[1]), scale(scratch[c, Z], frame[2])))
@@ -275,7 +275,7 @@ def write_contacts(scratch, at, count, frame):
 
 @formula
 def smallest_contact_gap(scratch, count):
-    """The smallest gap of the contacts told."""
+    """Smallest gap of the contacts in the first rows."""
     least = inf
     for k in range(count):
         least = min(least, scratch[k, 6])
@@ -284,10 +284,10 @@ def smallest_contact_gap(scratch, count):
 
 @formula
 def manifold(G, i, j, A, B, n, nearest, reach, scratch):
-    """Contacts of shapes i at A and j at B along the unit normal n from i to j: how many.
+    """Write contacts of shapes i at A and j at B along the unit normal n from i to j; returns their number.
 
-    ``nearest`` is the smallest gap and the point midway between the surfaces there; it is a contact of its own where
-    the faces do not hold a point as deep. A gap of inf: nothing is known of it.
+    ``nearest``: the smallest gap and the point midway between the surfaces there. It becomes a contact of its own if
+    the faces have no point as deep. A gap of inf means that it is unknown.
     """
     frame = contact_frame(n)
     m1, number_1 = face_in_frame(G, i, A, n, frame, scratch, FACE_1)

@@ -11,14 +11,14 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, dot, scale, store3, sub
 
-MAX_CONTACTS = 128  # contacts of a pair at most
-MAX_CORNERS = 32  # corners of a face at most
+MAX_CONTACTS = 128  # maximum contacts of a pair
+MAX_CORNERS = 32  # maximum corners of a face
 FACE_1 = MAX_CONTACTS
 FACE_2 = FACE_1 + MAX_CORNERS
 CLIPPED_1 = FACE_2 + MAX_CORNERS
 CLIPPED_2 = CLIPPED_1 + 3 * MAX_CORNERS
 SIMPLEX = CLIPPED_2 + 3 * MAX_CORNERS  # simplex and polytope
-FIELD_TRIANGLE = SIMPLEX + 400  # corners of the part of a height field that is at work
+FIELD_TRIANGLE = SIMPLEX + 400  # corners of the current triangle of a height field
 SCRATCH_ROWS = SIMPLEX + 512
 
 
@@ -32,7 +32,7 @@ def write_point(p, n, gap, name, scratch, k):
 
 @formula
 def unit_vector_between(a, b):
-    """The unit vector from a to b and their distance; x where they are one point (or so near that it has no unit)."""
+    """Return the unit vector from a to b, and their distance; the x axis if they coincide or nearly so."""
     d = sub(b, a)
     length = sqrt(dot(d, d))
     if length < 1e-150:
@@ -42,7 +42,7 @@ def unit_vector_between(a, b):
 
 @formula
 def sphere_contact(a, r, b, s, reach, scratch, k, name):
-    """The contact of balls about a and b of radius r and s into row k, if it is within reach: 1 or 0."""
+    """Write the contact of spheres at a and b with radii r and s to row k, if within reach; returns 1 or 0."""
     n, length = unit_vector_between(a, b)
     gap = length - r - s
     if not gap <= reach:
@@ -53,20 +53,20 @@ def sphere_contact(a, r, b, s, reach, scratch, k, name):
 
 @formula
 def clamp_unit(t):
-    """T held between 0 and 1."""
+    """Clamp t to [0, 1]."""
     return max(0.0, min(1.0, t))
 
 
 @formula
 def nearest_parameter(p, a, u):
-    """How far along the line from a to a + u (0 to 1) it is nearest to p."""
+    """Parameter (0 to 1) of the point of the segment from a to a + u nearest to p."""
     uu = dot(u, u)
     return clamp_unit(dot(sub(p, a), u) / uu) if uu > 0.0 else 0.0
 
 
 @formula
 def nearest_parameters(a, u, b, v):
-    """Parts of the lines a + s u, b + t v at which they are nearest (Ericson 2005, 5.1.9)."""
+    """Parameters of the nearest points of the segments a + s u, b + t v (Ericson 2005, 5.1.9)."""
     w = sub(a, b)
     uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
     uw, vw = dot(u, w), dot(v, w)
@@ -85,23 +85,23 @@ def nearest_parameters(a, u, b, v):
 
 
 DISC_CORNERS = 8
-UPRIGHT_ANGLE = 1e-4  # lean [rad] below which the corners stay where they are in the shape
+UPRIGHT_ANGLE = 1e-4  # tilt [rad] below which the corners are fixed in the shape
 SQRT_HALF = sqrt(0.5)
 
 
 @formula
 def lateral_direction(d):
-    """Unit vector (x, y) along which d leans away from z, and by how much; x where it does not."""
+    """Return the unit vector (x, y) of the lateral part of d, and its length; the x axis if it is zero."""
     s = sqrt(d[0] * d[0] + d[1] * d[1])
     return ((d[0] / s, d[1] / s) if s > 0.0 else (1.0, 0.0)), s
 
 
 @formula
 def disc_corners(r, z, up, d, scratch, at):
-    """Corners of the disc of radius r at height z that looks up (1) or down (-1): how many.
+    """Corners of the disc of radius r at height z that faces up (1) or down (-1); returns their number.
 
-    Where d leans, the first corner is the point of the disc that is farthest along d, so that a tilted disc touches
-    with its very rim.
+    If d is tilted, the first corner is the point of the disc farthest along d, so that a tilted disc touches exactly
+    with its rim.
     """
     (x, y), s = lateral_direction(d)
     if s < UPRIGHT_ANGLE:

@@ -12,14 +12,14 @@ KIND = BOX
 
 @formula
 def support(G, i, d):
-    """A corner."""
+    """Return the farthest corner."""
     h = load3(G.shape_x, i, PAR)
     return (h[0] if d[0] >= 0 else -h[0], h[1] if d[1] >= 0 else -h[1], h[2] if d[2] >= 0 else -h[2])
 
 
 @formula
 def face(G, i, d, scratch, at):
-    """One of its six sides."""
+    """Write the side that faces d best."""
     x, y, z = abs(d[0]), abs(d[1]), abs(d[2])
     n = 0 if x >= y and x >= z else (1 if y >= z else 2)
     u, v = (n + 1) % 3, (n + 2) % 3

@@ -1,4 +1,4 @@
-"""A capsule: a line along z with a radius."""
+"""A capsule: a line segment along z with a radius."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ KIND = CAPSULE
 
 @formula
 def support(G, i, d):
-    """The upper or the lower end of its line."""
+    """Return the upper or lower end of the segment."""
     h = G.shape_x[i, PAR + 1]
     return (0.0, 0.0, h if d[2] >= 0 else -h)
 
 
 @formula
 def face(G, i, d, scratch, at):
-    """Its line."""
+    """Write the segment."""
     h = G.shape_x[i, PAR + 1]
     store3(scratch, at, 0, (0.0, 0.0, -h))
     store3(scratch, at + 1, 0, (0.0, 0.0, h))
@@ -28,5 +28,5 @@ def face(G, i, d, scratch, at):
 
 @formula
 def radius(G, i):
-    """Radius about the line."""
+    """Radius about the segment."""
     return G.shape_x[i, PAR]

@@ -1,4 +1,4 @@
-"""A cone: its base in z = 0, its tip at +z."""
+"""A cone: base in z = 0, tip at +z."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KIND = CONE
 
 @formula
 def support(G, i, d):
-    """Its tip or a point of its rim."""
+    """Return the tip or a point of the rim."""
     r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
     (x, y), s = lateral_direction(d)
     if h * d[2] > r * s:
@@ -24,7 +24,7 @@ def support(G, i, d):
 
 @formula
 def face(G, i, d, scratch, at):
-    """A line of its mantle, or its base as a polygon."""
+    """Write a line of the lateral surface, or the base as a polygon."""
     r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
     (x, y), s = lateral_direction(d)
     if h * s + r * d[2] > -d[2] * sqrt(h * h + r * r):

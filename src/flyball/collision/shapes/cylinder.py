@@ -13,7 +13,7 @@ KIND = CYLINDER
 
 @formula
 def support(G, i, d):
-    """A point of either rim."""
+    """Return a point of one of the rims."""
     r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
     (x, y), _ = lateral_direction(d)
     return (r * x, r * y, h if d[2] >= 0 else -h)
@@ -21,7 +21,7 @@ def support(G, i, d):
 
 @formula
 def face(G, i, d, scratch, at):
-    """A line of its side, or either disc as a polygon."""
+    """Write a line of the lateral surface, or one of the discs as a polygon."""
     r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
     (x, y), s = lateral_direction(d)
     if s > abs(d[2]):

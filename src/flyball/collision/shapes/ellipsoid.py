@@ -13,7 +13,7 @@ KIND = ELLIPSOID
 
 @formula
 def support(G, i, d):
-    """Where the normal is d: A d / |A^(1/2) d|, A the squares of the half axes."""
+    """Return the point with normal d: A d / |A^(1/2) d|, with A the squares of the half axes."""
     a = load3(G.shape_x, i, PAR)
     x, y, z = a[0] * d[0], a[1] * d[1], a[2] * d[2]
     length = sqrt(x * x + y * y + z * z)

@@ -1,11 +1,11 @@
-"""A height field: heights over a grid, two triangles a cell, solid below. It does not move.
+"""A height field: heights over a grid, two triangles per cell, solid below. It is fixed.
 
 Parameters: number of heights along x and along y, and the width of a cell along x and along y; the first height
-is over the origin, height (i, j) over (i dx, j dy). Heights stand from ``FIRST`` on in `Geometry.vertex`, three
-a row, those with the same i together. The diagonal of a cell goes from (i, j) to (i + 1, j + 1).
+is over the origin, height (i, j) over (i dx, j dy). Heights are in `Geometry.vertex` from row ``FIRST`` on, three
+per row, those with the same i consecutively. The diagonal of a cell goes from (i, j) to (i + 1, j + 1).
 
-A shape meets one triangle at a time, which stands in the scratch at `FIELD_TRIANGLE`, its number in the row
-after. Contacts are gathered over many triangles, merged where they are alike, and reduced.
+A shape is tested against one triangle at a time, the current triangle. It is in the scratch at `FIELD_TRIANGLE`, its
+number in the row after. Contacts are gathered over many triangles, merged if they are alike, and reduced.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..shape_kinds import FIELD
 from ..tables import FIRST, PAR
 
 KIND = FIELD
-FEATURE_PERIOD = 65536.0  # numbers of triangles repeat after as many
+FEATURE_PERIOD = 65536.0  # numbers of triangles are taken modulo this number
 
 
 @formula
@@ -33,7 +33,7 @@ def grid(G, i):
 
 @formula
 def grid_point(G, f, i, j):
-    """The point of the surface over grid point (i, j)."""
+    """Return the point of the surface over grid point (i, j)."""
     k = i * int(G.shape_x[f, PAR + 1]) + j
     z = G.vertex[G.shape_i[f, FIRST] + k // 3, k % 3]
     return (i * G.shape_x[f, PAR + 2], j * G.shape_x[f, PAR + 3], z)
@@ -41,7 +41,7 @@ def grid_point(G, f, i, j):
 
 @formula
 def height(G, f, x, y):
-    """Height of the surface over (x, y); far below where there is none."""
+    """Height of the surface over (x, y); far below outside the grid."""
     nx, ny, dx, dy = grid(G, f)
     u, v = x / dx, y / dy
     if not (0.0 <= u <= nx - 1.0 and 0.0 <= v <= ny - 1.0):
@@ -59,7 +59,7 @@ def height(G, f, x, y):
 
 @formula
 def support(G, i, d):
-    """The knot that is farthest along d."""
+    """Return the grid point farthest along d."""
     nx, ny, dx, dy = grid(G, i)
     best = grid_point(G, i, 0, 0)
     for a in range(nx):
@@ -72,21 +72,21 @@ def support(G, i, d):
 
 @formula
 def face(G, i, d, scratch, at):
-    """The triangle at work."""
+    """Write the current triangle."""
     for k in range(3):
         store3(scratch, at + k, 0, load3(scratch, FIELD_TRIANGLE + k, 0))
     return 3, int(scratch[FIELD_TRIANGLE + 3, 0] % FEATURE_PERIOD)
 
 
-FIRST_GATHERED = 8  # first row of the contacts gathered: a manifold is written before it
-MAX_GATHERED = 24  # contacts of a field and a shape at most, where there are more the ones most different
-FOLD_TOLERANCE = 1e-6  # sine of the angle by which an edge must be bent outwards to be one
-SAME_CONTACT = 1e-4  # of the reach of the patch: contacts nearer to each other, with the same normal, are one
+FIRST_GATHERED = 8  # first row of gathered contacts, behind those of a manifold
+MAX_GATHERED = 24  # maximum contacts of a field and a shape; of more, the most different ones are kept
+FOLD_TOLERANCE = 1e-6  # smallest sine of the angle at a convex edge
+SAME_CONTACT = 1e-4  # relative to the cell width; closer contacts with the same normal are merged
 
 
 @formula
 def across_edge(upper, k):
-    """Grid point, from the cell's, across edge k (from corner k to the next) of the lower or upper triangle."""
+    """Grid point, relative to the cell's, opposite to edge k (from corner k on) of the lower or upper triangle."""
     if upper:
         return ((1, 0), (1, 2), (-1, 0))[k]
     return ((0, -1), (2, 1), (0, 1))[k]
@@ -94,7 +94,7 @@ def across_edge(upper, k):
 
 @formula
 def triangle_corner(upper, k):
-    """Grid point, from the cell's, of corner k."""
+    """Grid point, relative to the cell's, of corner k."""
     if upper:
         return ((0, 0), (1, 1), (0, 1))[k]
     return ((0, 0), (1, 0), (1, 1))[k]
@@ -109,7 +109,7 @@ def is_grid_point(G, f, i, j):
 
 @formula
 def load_triangle(G, f, i, j, upper, scratch):
-    """Put the triangle into the scratch; its upward normal, not of unit length."""
+    """Load a triangle into the scratch; returns its upward normal, not of unit length."""
     nx, ny, dx, dy = grid(G, f)
     for k in range(3):
         u, v = triangle_corner(upper, k)
@@ -121,13 +121,13 @@ def load_triangle(G, f, i, j, upper, scratch):
 
 @formula
 def is_below_plane(G, f, i, j, x, n, width):
-    """Whether grid point (i, j), if there is one, is not beyond the plane through x with the normal n."""
+    """Whether grid point (i, j) is outside the grid, or not above the plane through x with the normal n."""
     return not is_grid_point(G, f, i, j) or dot(n, sub(grid_point(G, f, i, j), x)) <= FOLD_TOLERANCE * width
 
 
 @formula
 def is_convex_edge(G, f, i, j, upper, n, k, scratch):
-    """Whether edge k of the triangle with the unit normal n is bent outwards, or the field ends there."""
+    """Whether edge k of the triangle with the unit normal n is convex, or at the border of the field."""
     nx, ny, dx, dy = grid(G, f)
     u, v = across_edge(upper, k)
     if not is_grid_point(G, f, i + u, j + v):
@@ -139,7 +139,7 @@ def is_convex_edge(G, f, i, j, upper, n, k, scratch):
 
 @formula
 def has_convex_edge(G, f, i, j, upper, n, scratch):
-    """Whether any edge of the triangle is."""
+    """Whether any edge of the triangle is convex."""
     found = False
     for k in range(3):
         found = found or is_convex_edge(G, f, i, j, upper, n, k, scratch)
@@ -148,7 +148,7 @@ def has_convex_edge(G, f, i, j, upper, n, scratch):
 
 @formula
 def is_on_convex_edge(G, f, i, j, upper, n, x, scratch):
-    """Whether x, in the plane of the triangle, lies on such an edge."""
+    """Whether x, in the plane of the triangle, lies on a convex edge."""
     for k in range(3):
         a, b = load3(scratch, FIELD_TRIANGLE + k, 0), load3(scratch, FIELD_TRIANGLE + (k + 1) % 3, 0)
         across = cross(n, sub(b, a))
@@ -161,9 +161,9 @@ def is_on_convex_edge(G, f, i, j, upper, n, x, scratch):
 
 @formula
 def is_field_normal(G, f, i, j, upper, n, scratch):
-    """Whether n is a normal of the field itself where the triangle in the scratch reaches farthest along n.
+    """Whether n is a normal of the field at the part of the current triangle that is farthest along n.
 
-    True for a side; at an edge if the triangle across is below, at a corner if all six neighbours are.
+    True for a face; at an edge if the triangle across is below, at a corner if all six neighbours are.
     """
     nx, ny, dx, dy = grid(G, f)
     width = dx + dy
@@ -193,7 +193,7 @@ def is_field_normal(G, f, i, j, upper, n, scratch):
 
 @formula
 def is_over_triangle(x, n, scratch):
-    """Whether x is over the triangle in the scratch as seen along its normal n (of any length)."""
+    """Whether x is over the current triangle, as seen along its normal n (of any length)."""
     for k in range(3):
         a, b = load3(scratch, FIELD_TRIANGLE + k, 0), load3(scratch, FIELD_TRIANGLE + (k + 1) % 3, 0)
         if dot(n, cross(sub(b, a), sub(x, a))) < -1e-9 * dot(n, n):
@@ -203,7 +203,7 @@ def is_over_triangle(x, n, scratch):
 
 @formula
 def gather_contact(scratch, count, x, n, gap, name, near):
-    """Add a contact unless there is one like it, which the deeper of both then stands for; how many there are."""
+    """Add a contact, or merge it with a similar one, keeping the deeper of both; returns the number of contacts."""
     for k in range(FIRST_GATHERED, FIRST_GATHERED + count):
         off = sub(load3(scratch, k, 0), x)
         if dot(off, off) <= near * near and dot(load3(scratch, k, 3), n) > 1.0 - FOLD_TOLERANCE:
@@ -222,7 +222,7 @@ def gather_contact(scratch, count, x, n, gap, name, near):
 
 @formula
 def contact_difference(scratch, a, b, near):
-    """How different two contacts are: the square of a length [m]."""
+    """Difference of two contacts as the square of a length [m]."""
     off = sub(load3(scratch, a, 0), load3(scratch, b, 0))
     turn = sub(load3(scratch, a, 3), load3(scratch, b, 3))
     return dot(off, off) + dot(turn, turn) * (near / SAME_CONTACT) ** 2
@@ -230,7 +230,7 @@ def contact_difference(scratch, a, b, near):
 
 @formula
 def reduce_contacts(scratch, at, count, near):
-    """Keep `MAX_GATHERED` contacts: the deepest, then always the one most unlike those kept; how many remain."""
+    """Keep `MAX_GATHERED` contacts: the deepest, then always the most different one; returns the number kept."""
     if count <= MAX_GATHERED:
         return count
     for kept in range(MAX_GATHERED):
@@ -249,19 +249,19 @@ def reduce_contacts(scratch, at, count, near):
 
 
 def height_field_rows(heights: Any, dx: float, dy: float) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Rows for `Geometry.vertex` and the parameters of a height field.
+    """Convert heights to rows of `Geometry.vertex` and the parameters of a height field.
 
     Parameters
     ----------
     heights : (nx, ny) numbers [m]
-        Height (i, j) stands over (i dx, j dy) of the shape's axes.
+        Height (i, j) is over (i dx, j dy) of the shape's axes.
     dx, dy : float
         Width of a cell [m].
 
     Raises
     ------
     ModelError
-        If heights are no finite numbers in two or more rows and columns, or a width is not greater than zero.
+        If heights are not finite numbers in two or more rows and columns, or a width is not greater than zero.
     """
     z = np.asarray(heights, dtype=float)
     if z.ndim != 2 or min(z.shape) < 2 or not np.isfinite(z).all():

@@ -1,4 +1,4 @@
-"""Half a ball: its flat side in z = 0, its dome towards +z."""
+"""A solid hemisphere: flat side in z = 0, dome towards +z."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KIND = HEMISPHERE
 
 @formula
 def support(G, i, d):
-    """A point of the dome, or of the rim."""
+    """Return a point of the dome or of the rim."""
     r = G.shape_x[i, PAR]
     if d[2] > 0.0:
         return scale(r / sqrt(dot(d, d)), d)
@@ -24,7 +24,7 @@ def support(G, i, d):
 
 @formula
 def face(G, i, d, scratch, at):
-    """Its flat side as a polygon, where that looks down by more than 45 degrees; else no flat part."""
+    """Write the flat side as a polygon, if d points down by more than 45 degrees; otherwise no flat part."""
     if d[2] * d[2] < 0.5 or d[2] > 0.0:
         return 0, 1
     return disc_corners(G.shape_x[i, PAR], 0.0, -1.0, d, scratch, at), 0

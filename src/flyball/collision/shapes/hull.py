@@ -1,10 +1,10 @@
-"""A convex polyhedron, as `convex_decomposition.Hull` writes it into the tables.
+"""A convex polyhedron, written into the tables by `convex_decomposition.Hull`.
 
-Vertices stand from ``FIRST`` on in `Geometry.vertex`, after them the outward unit normals of its faces, one a
-row. Faces stand from ``FACE_FIRST`` on in `Geometry.face`; corners count from the hull's first vertex.
-Parameters: rounding radius, and where in `Geometry.face` its edges are, -1 if it is too small to need them: the
-numbers of six vertices to begin at (least and largest x, y, z), where the neighbours of each vertex begin,
-counted from there, and the neighbours, each list closed by -1.
+Vertices are in `Geometry.vertex` from row ``FIRST`` on, followed by the outward unit normals of its faces, one per
+row. Faces are in `Geometry.face` from ``FACE_FIRST`` on; corners are numbered from the hull's first vertex.
+Parameters: rounding radius, and the first place of its edges in `Geometry.face`, -1 if it is too small to need them:
+the numbers of six start vertices (smallest and largest x, y, z), the place of each vertex's neighbours, counted from
+there, and the neighbours, each list closed by -1.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from ..tables import COUNT, FACE_COUNT, FACE_FIRST, FIRST, PAR
 
 KIND = HULL
 EDGE_LISTS = PAR + 1
-IN_PLANE = 1e-7  # of the distance, what a vertex may be off the plane of a face that it is a corner of
+IN_PLANE = 1e-7  # relative to the distance; largest offset of a vertex from the plane of its face
 
 
 @formula
 def radius(G, i):
-    """As given."""
+    """Return the rounding radius."""
     return G.shape_x[i, PAR]
 
 
 @formula
 def climb_edges(G, first, at, d):
-    """Number of the farthest vertex, found along the edges: on a convex body no way up ends lower."""
+    """Find the farthest vertex along the edges; on a convex body every ascending path ends at it."""
     x, y, z = absolute(d[0]), absolute(d[1]), absolute(d[2])
     n = 0 if x >= y and x >= z else (1 if y >= z else 2)
     here = G.face[at + 2 * n + (1 if d[n] > 0.0 else 0)]
@@ -48,7 +48,7 @@ def climb_edges(G, first, at, d):
 
 @formula
 def farthest_vertex(G, i, d):
-    """Row of the vertex that is farthest along d."""
+    """Row of the vertex farthest along d."""
     first = G.shape_i[i, FIRST]
     at = int(G.shape_x[i, EDGE_LISTS])
     if at >= 0:
@@ -63,13 +63,13 @@ def farthest_vertex(G, i, d):
 
 @formula
 def support(G, i, d):
-    """A vertex."""
+    """Return the farthest vertex."""
     return load3(G.vertex, farthest_vertex(G, i, d), 0)
 
 
 @formula
 def facing_side(G, i, d, top):
-    """Of the faces that hold the vertex ``top``, number and place of the one that looks along d best."""
+    """Return the number and place of the face that faces d best, among those with the vertex ``top``."""
     first, normals = G.shape_i[i, FIRST], G.shape_i[i, FIRST] + G.shape_i[i, COUNT]
     at = G.shape_i[i, FACE_FIRST]
     number, place, best = 0, at, -2.0
@@ -85,7 +85,7 @@ def facing_side(G, i, d, top):
 
 @formula
 def face(G, i, d, scratch, at):
-    """One of its sides; of one with more corners than there is room for, as many of them, the farthest vertex too."""
+    """Write the side that faces d best; of too many corners only `MAX_CORNERS`, including the farthest vertex."""
     top = farthest_vertex(G, i, d)
     first = G.shape_i[i, FIRST]
     number, place = facing_side(G, i, d, load3(G.vertex, top, 0))

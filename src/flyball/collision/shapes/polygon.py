@@ -1,4 +1,4 @@
-"""A convex polygon in z = 0, or a line between two points, with a rounding radius; for planar mechanisms."""
+"""A convex polygon in z = 0, or a line segment, with a rounding radius; for planar mechanisms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KIND = POLYGON
 
 @formula
 def support(G, i, d):
-    """A corner."""
+    """Return the farthest corner."""
     first = best = G.shape_i[i, FIRST]
     far = G.vertex[best, 0] * d[0] + G.vertex[best, 1] * d[1]
     for k in range(first + 1, first + G.shape_i[i, COUNT]):
@@ -25,7 +25,7 @@ def support(G, i, d):
 
 @formula
 def facing_edge(G, i, d):
-    """The edge whose outward normal is nearest to d: first corner, second corner (rows of the vertices)."""
+    """Edge whose outward normal is nearest to d: first corner, second corner (rows of the vertices)."""
     first, count = G.shape_i[i, FIRST], G.shape_i[i, COUNT]
     best, far, a = first, -2.0, first + count - 1
     for b in range(first, first + count):
@@ -40,7 +40,7 @@ def facing_edge(G, i, d):
 
 @formula
 def face(G, i, d, scratch, at):
-    """One of its sides."""
+    """Write the side that faces d best."""
     a, b = facing_edge(G, i, d)
     store3(scratch, at, 0, load3(G.vertex, a, 0))
     if a == b:
@@ -51,5 +51,5 @@ def face(G, i, d, scratch, at):
 
 @formula
 def radius(G, i):
-    """Rounding radius."""
+    """Return the rounding radius."""
     return G.shape_x[i, PAR]

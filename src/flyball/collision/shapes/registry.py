@@ -1,16 +1,16 @@
-"""Every kind of convex shape, found in the files of this folder, and formulas that choose by kind.
+"""All kinds of convex shapes, found in the files of this folder, and formulas that select by kind.
 
 A file declares ``KIND``, its number (`shape_kinds`), and ``support``; it then works with every other convex
 shape. It may also define ``face`` (contacts at more than one point) and ``radius``. All are formulas; ``G`` is
 the `Geometry`, ``i`` the shape, and everything is in the shape's axes:
 
-- ``support(G, i, d)`` -> the point of its core that is farthest along ``d``; of points equally far always the
-  same one. ``d`` is any vector, not all zeros.
-- ``face(G, i, d, scratch, at)`` -> number of corners, number of the face. The flat part of the core's surface
-  that faces the unit vector ``d`` best: its corners, counter-clockwise seen from the tip of ``d``, into columns
-  0 to 2 of the rows of ``scratch`` from ``at`` on, at most `MAX_CORNERS`; two corners are an edge, one is a
-  point. The point of ``support(G, i, d)`` is among its points. Corners and number stay the same while the shape
-  turns a little.
+- ``support(G, i, d)`` -> the point of its core farthest along ``d``; always the same one of equally far points.
+  ``d`` is any vector, not all zeros.
+- ``face(G, i, d, scratch, at)`` -> number of corners, number of the face. It writes the flat part of the core's
+  surface that faces the unit vector ``d`` best: its corners, counter-clockwise seen from the tip of ``d``, to
+  columns 0 to 2 of the rows of ``scratch`` from ``at`` on, at most `MAX_CORNERS`; two corners are an edge, one is
+  a point. The point of ``support(G, i, d)`` is part of it. Corners and number are unchanged by a small rotation of
+  the shape.
 - ``radius(G, i)`` -> rounding radius of its core.
 
 Formulas of an unknown kind return nan.
@@ -40,7 +40,7 @@ class Shape:
 
 @formula
 def no_rounding(G, i):
-    """No rounding."""
+    """Return zero, the rounding radius of shapes without rounding."""
     return 0.0
 
 
@@ -52,7 +52,7 @@ def _modules() -> list[ModuleType]:
 
 
 def declared_shapes(modules: list[ModuleType]) -> tuple[Shape, ...]:
-    """Shapes that these modules declare, by number.
+    """Collect the shapes declared by these modules, by number.
 
     Raises
     ------
@@ -72,10 +72,10 @@ SHAPES = declared_shapes(_modules())
 
 
 support = dispatch_by_kind(__name__, "support", "G, i, d", {s.kind: s.support for s in SHAPES}, "(nan, nan, nan)")
-"""The farthest point of a core along d."""
+"""Farthest point of a core along d."""
 
 radius = dispatch_by_kind(__name__, "radius", "G, i", {s.kind: s.radius for s in SHAPES}, "nan")
-"""The rounding radius."""
+"""Rounding radius."""
 
 _flat_face = dispatch_by_kind(__name__, "flat", "G, i, d, room, at", {s.kind: s.face for s in SHAPES if s.face}, "0, 0")
 

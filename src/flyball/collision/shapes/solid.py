@@ -1,6 +1,6 @@
 """A user-defined convex shape, by its support function: see `model.shapes.solid.ConvexSolid`.
 
-Parameters: seven numbers for that function, and the factor by which the shape is enlarged.
+Parameters: seven numbers for that function, and a scale factor.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from ..tables import PAR
 
 KIND = SOLID
 SUPPORT_SIGNATURES = (Signature("support", "par, d", (7, 3), 3, "a point: a tuple of three numbers"),)
-"""The formula of a shape of a user's own."""
+"""Signature of the formula of a user-defined shape."""
 
 
 @formula
 def support(G, i, d):
-    """As the formula says."""
+    """Evaluate the user's formula."""
     k, x = PAR, G.shape_x
     par = (x[i, k], x[i, k + 1], x[i, k + 2], x[i, k + 3], x[i, k + 4], x[i, k + 5], x[i, k + 6])
     return scale(x[i, k + 7], formula_at(G.code[i], 0, (par, d), (nan, nan, nan)))

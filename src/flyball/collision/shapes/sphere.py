@@ -11,11 +11,11 @@ KIND = SPHERE
 
 @formula
 def support(G, i, d):
-    """The middle."""
+    """Return the centre."""
     return (0.0, 0.0, 0.0)
 
 
 @formula
 def radius(G, i):
-    """All of it is rounding."""
+    """Radius; the core is a point."""
     return G.shape_x[i, PAR]

@@ -1,4 +1,4 @@
-"""Expressions as C99: a source and its header, which need nothing but the C library's mathematics."""
+"""Expressions as C99: a source file and its header, which need only the C math library."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KEYWORDS = [
     *("auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern"),
     *("float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed"),
     *("sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while"),
-    *("y0", "y1", "yn", "j0", "j1", "jn", "gamma", "main"),  # and functions of the C library that would be hidden
+    *("y0", "y1", "yn", "j0", "j1", "jn", "gamma", "main"),  # C library functions that would be hidden
 ]
 
 FUNCTIONS = {
@@ -81,14 +81,14 @@ static double spline(const double *data, int order, double x)
 
 
 class Sources(NamedTuple):
-    """The two files."""
+    """Texts of the two files."""
 
     source: str
     header: str
 
 
 def literal(x: float) -> str:
-    """A number that reads back to the last bit."""
+    """A number as text that reads back exactly."""
     return repr(float(x)) if np.isfinite(x) else "NAN" if x != x else "INFINITY" if x > 0.0 else "-INFINITY"
 
 
@@ -101,9 +101,9 @@ def c_sources(
     ----------
     routines : sequence of Routine
     name : str
-        What files are called, and what all names begin with.
+        Name of the files, and prefix of all names.
     head : str
-        What the comments at the head of both say.
+        Text of the header comment of both.
     constants : mapping, optional
         Name -> numbers or texts: arrays beside the functions.
 
@@ -151,7 +151,7 @@ def _constant(name: str, items: Sequence[Any], declared: bool = False) -> str:
 
 
 def _comment(text: str) -> str:
-    """A comment of some lines."""
+    """A comment of several lines."""
     text = text.strip().replace("*/", "* /").replace("/*", "/ *")
     return "/* " + "\n".join(("   " + x).rstrip() for x in text.splitlines()).lstrip() + " */\n"
 
@@ -206,7 +206,7 @@ def _function(r: Routine, prefix: str, language: Language) -> str:
 
 
 def _description(r: Routine) -> str:
-    """What a function takes and gives."""
+    """Description of the arguments and results of a function."""
     text = [r.meaning or r.name]
     given = _argument_names(r)
     for a, name in zip(r.arguments, given):

@@ -18,8 +18,8 @@ from .routines import Routine, refuse_python_functions
 def casadi_function(routine: Routine) -> Any:
     """A routine as a ``casadi.Function`` of SX, which takes MX and numbers as well.
 
-    Vectors are columns; results of more than two dimensions have their rows below one another. Where one of two
-    branches holds, the other is computed as well and left out.
+    Vectors are columns; results of more than two dimensions have their rows below one another. Of two branches both are
+    computed and one is selected.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def casadi_function(routine: Routine) -> Any:
     results = []
     for array in routine.arrays.values():
         rows = array.reshape(-1, array.shape[-1] if array.ndim > 1 else 1)
-        out = ca.SX(*rows.shape)  # what is not put in is a structural zero
+        out = ca.SX(*rows.shape)  # entries that are not set are structural zeros
         for (i, k), x in np.ndenumerate(rows):
             x = known[x.index] if isinstance(x, Node) else float(x)
             if not (isinstance(x, float) and x == 0.0):
@@ -77,7 +77,7 @@ def _operation(ca: Any, functions: dict[str, Callable[..., Any]], x: Node, args:
 
 
 def _table_value(ca: Any, f: Function, args: Sequence[Any]) -> Any:
-    """A table: the piece that holds, found by halves."""
+    """Value of a table: the segment is found by bisection."""
     if "constant" in f.told:
         return f.told["constant"]
     data: list[Any] = list(f.told["table"])
@@ -105,7 +105,7 @@ def _table_value(ca: Any, f: Function, args: Sequence[Any]) -> Any:
 
 
 def polynomial(c: Sequence[Any], s: Any, order: int) -> Any:
-    """A derivative of a cubic."""
+    """Value or derivative of a cubic."""
     if any(isinstance(x, float) and not math.isfinite(x) for x in c):
         return math.nan
     if order == 0:

@@ -1,4 +1,4 @@
-"""Layout of formulas for people: signed terms in reading order, fractions, powers, names and line breaks."""
+"""Layout of formulas for reading: signed terms in reading order, fractions, powers, names and line breaks."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..simplification.reading_cost import ExactNumber, exact_number, reading_cos
 
 
 def wrap_fragments(fragments: list[str], most: int, width: Callable[[str], int] = len) -> list[str]:
-    """Pieces joined to lines of at most ``most`` letters where they are short enough.
+    """Join fragments to lines of at most ``most`` characters where possible.
 
     Parameters
     ----------
     fragments : list of str
-        A line may be broken before each.
+        Lines may be broken before each fragment.
     most : int
     width : callable
-        Letters of a piece.
+        Width of a fragment in characters.
     """
     depths = [0]
     for piece in fragments[:-1]:
@@ -39,7 +39,7 @@ def wrap_fragments(fragments: list[str], most: int, width: Callable[[str], int] 
 
 
 def _best_break(fragments: list[str], depths: list[int], most: int, width: Callable[[str], int]) -> int:
-    """Where to break: among the places that leave a line not short, the last of those in the fewest parentheses."""
+    """Index of the best break: of those that do not leave a short line, the last in the fewest parentheses."""
     used, best, found = 0, (10**6, 0), len(fragments) - 1
     for k in range(1, len(fragments)):
         used += width(fragments[k - 1])
@@ -60,7 +60,7 @@ LATEX_ESCAPES = {c: rf"\{c}" for c in "_%#&${}"} | {"~": r"\sim ", "^": r"\wedge
 
 
 def latex_symbol(symbol: Symbol) -> str:
-    """A symbol in LaTeX: as it says itself, or by its name."""
+    """A symbol in LaTeX: its own LaTeX text, or its name."""
     return symbol.latex or latex_name(symbol.name)
 
 
@@ -84,7 +84,7 @@ def latex_name(text: str) -> str:
 
 
 def latex_letter(word: str) -> str:
-    """A letter, Greek if it is called so."""
+    """A letter; Greek if the word is the name of a Greek letter."""
     return LATEX_LETTERS.get(word) or (f"\\{word}" if word in GREEK else word)
 
 
@@ -96,19 +96,19 @@ def latex_subscript(text: str) -> str:
 
 
 def latex_escaped(text: str) -> str:
-    """Text between other LaTeX."""
+    """Escape text for LaTeX."""
     return "".join(LATEX_ESCAPES.get(c, c) for c in text)
 
 
 Power = tuple[Node, int]
 FUNCTION, SECOND, SUM, OTHER_FACTOR = 6, 5, 4, 3
-KNOWN = 10  # digits below which a decimal is taken for exact
-ROUNDED = 1e-14  # of a number: what rounding makes of it
+KNOWN = 10  # decimals with fewer digits count as exact
+ROUNDED = 1e-14  # relative rounding error of a number
 
 
 @dataclass(frozen=True)
 class Term:
-    """One term of a sum: a sign, a number, powers above and below the line."""
+    """One term of a sum: a sign, a number, powers in numerator and denominator."""
 
     negative: bool
     number: ExactNumber | float
@@ -117,22 +117,22 @@ class Term:
 
     @property
     def one(self) -> bool:
-        """Whether the number is one, which is not written beside anything."""
+        """Whether the number is one, which is not written before other factors."""
         return self.number == ExactNumber(1, 1)
 
     @property
     def plain(self) -> bool:
-        """Whether it is a number alone."""
+        """Whether the term is a number only."""
         return not self.above and not self.below
 
 
 class Layout:
-    """Expressions as terms.
+    """Converts expressions to terms for printing.
 
     Parameters
     ----------
     names : mapping of int to str
-        Nodes that are written by a name of their own, by their index.
+        Names of nodes that are not written out, by node index.
     """
 
     def __init__(self, names: Mapping[int, str] | None = None) -> None:
@@ -140,7 +140,7 @@ class Layout:
         self.costs: dict[int, float] = dict.fromkeys(self.names, 1.0)
 
     def sum(self, x: Node, top: bool = False) -> list[Term]:
-        """Terms of an expression, in the order of reading; ``top``: though it may have a name."""
+        """Terms of an expression in reading order; ``top``: written out even if it has a name."""
         out: list[tuple[Node, bool]] = []
         to_see = [(x, False)]
         while to_see:
@@ -158,11 +158,11 @@ class Layout:
 
     @staticmethod
     def turned(term: Term, turned: bool) -> Term:
-        """A term, or minus it."""
+        """The term, negated if ``turned``."""
         return replace(term, negative=not term.negative) if turned else term
 
     def place(self, signed: tuple[Node, bool]) -> tuple:
-        """Where a term stands in a sum: numbers, then what does not move, short ones first."""
+        """Sort key of a term in a sum: numbers, then constant terms, short ones first."""
         x, turned = signed
         if x.op == NUMBER:
             return (0 if (x.value > 0.0) is not turned else 3, 0.0, ())
@@ -172,7 +172,7 @@ class Layout:
         return (1 + x.moving, math.floor(length), tuple((y.index, -n) for y, n in powers))
 
     def term(self, x: Node, top: bool = False) -> Term:
-        """One term: its numbers multiplied, equal factors joined."""
+        """One term, with numbers multiplied and equal factors joined."""
         c = 1.0
         powers: dict[int, Power] = {}
         to_see = [(x, 1)]
@@ -195,7 +195,7 @@ class Layout:
         )
 
     def rank(self, power: Power) -> tuple[int, int]:
-        """Place of a factor: masses, other parameters, what moves, sums, functions."""
+        """Sort key of a factor: masses, other parameters, moving quantities, sums, functions."""
         x = power[0]
         if x.index in self.names:
             return (2 if not x.moving else OTHER_FACTOR, x.index)
@@ -210,12 +210,12 @@ class Layout:
 
 
 def is_negated_sum(x: Node) -> bool:
-    """Whether it is minus a sum."""
+    """Whether an expression is minus a sum."""
     return x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0 and x.args[1].op == ADD
 
 
 def number_text(x: float) -> str:
-    """A decimal of up to twelve digits; of more where it would be taken for a shorter one that it is not."""
+    """A decimal of up to twelve digits; more where twelve would suggest another exact number."""
     short = f"{x:.12g}"
     digits = short.partition("e")[0].lstrip("-0.").replace(".", "")
     if len(digits) < KNOWN and abs(float(short) - x) > ROUNDED * abs(x):

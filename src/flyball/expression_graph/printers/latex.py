@@ -21,32 +21,33 @@ OPERATORS = {
 }  # fmt: skip
 
 
-LONG = 160  # letters of LaTeX from which on a sum may be broken, though it stands in a fraction or high parentheses
+# From so many characters of LaTeX on, a sum may be broken even in a fraction or high parentheses.
+LONG = 160
 WORD = re.compile(r"\\(?:text|mathrm)\{[^}]{2}")
 BREAK = "\x1f"
-"""Where a line may be broken: before the terms of a sum that stands in no fraction, root or high parenthesis."""
+"""Mark of a possible line break: before terms of a sum outside of fractions, roots and high parentheses."""
 
 
 def latex(x: Any, names: Mapping[int, str] | None = None) -> str:
-    """One expression, as it stands between dollars.
+    """One expression in LaTeX math mode.
 
     Parameters
     ----------
     x : Node or number
     names : mapping of int to str, optional
-        Nodes that have a name of their own (`naming.named`), in LaTeX, by their index.
+        LaTeX names of nodes that are not written out, by node index.
     """
     return LatexPrinter(names).expression(x).replace(BREAK, "")
 
 
 class LatexPrinter:
-    """Writes expressions in LaTeX."""
+    """Printer of expressions in LaTeX."""
 
     def __init__(self, names: Mapping[int, str] | None = None) -> None:
         self.layout = Layout(names)
 
     def expression(self, x: Any, top: bool = False) -> str:
-        """A sum, with marks where it may be broken; ``top``: written out though it has a name."""
+        """A sum with marks of possible breaks; ``top``: written out even if it has a name."""
         if not isinstance(x, Node):
             return number(float(x))
         if x.op == "choose" and (top or x.index not in self.layout.names):
@@ -68,7 +69,7 @@ class LatexPrinter:
     def term(self, term: Term, top: bool = False) -> str:
         """One term without its sign."""
         up, down = _numeric(term.number)
-        alone = bool(term.below)  # in a fraction a sum that is all of a side has no parentheses
+        alone = bool(term.below)  # a sum that is a whole side of a fraction has no parentheses
         above = [self.side(p, alone and len(term.above) == 1 and not up, top) for p in term.above]
         below = [self.side(p, alone and len(term.below) == 1 and not down) for p in term.below]
         if term.below and BREAK in juxtaposed(above) and len(juxtaposed(above)) > LONG:
@@ -80,7 +81,7 @@ class LatexPrinter:
         return juxtaposed(front + above) or "1"
 
     def side(self, power: Power, single: bool, top: bool = False) -> str:
-        """A factor of one side of a fraction."""
+        """A factor in the numerator or denominator."""
         x, n = power
         if single and n == 1 and x.op == ADD and x.index not in self.layout.names:
             return self.expression(x)
@@ -103,7 +104,7 @@ class LatexPrinter:
         return f"{self.parentheses(inner) if x.op == POWER else inner}^{{{n}}}"
 
     def function(self, operator: str, x: Node) -> str:
-        """A function: of one symbol without parentheses."""
+        """A function; without parentheses if its argument is one symbol."""
         if len(x.args) == 1 and (x.args[0].op == SYMBOL or x.args[0].index in self.layout.names):
             return f"{operator} {self.expression(x.args[0])}"
         return f"{operator}{self.parentheses(', '.join(map(self.apart, x.args)))}".replace(BREAK, "")
@@ -129,27 +130,27 @@ class LatexPrinter:
         return self.parentheses(self.expression(x))
 
     def apart(self, x: Node) -> str:
-        """An expression beside which others stand that are no part of it."""
+        """An expression that stands next to others, in parentheses if necessary."""
         return self.power((x, 1)) if x.op == "choose" else self.expression(x)
 
     def cases(self, x: Node) -> str:
-        """One of two, as a condition says: nothing closes it on its right."""
+        """Cases of a condition; they have no closing delimiter."""
         c, a, b = map(self.apart, x.args)
         return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
 
     @staticmethod
     def parentheses(inner: str) -> str:
-        """Parentheses that are as high as what they hold."""
+        """Parentheses with the height of their content."""
         high = any(mark in inner for mark in (r"\frac", r"\sqrt", r"\begin", r"\left"))
         if not high:
             return f"({inner})"
-        if BREAK in inner and len(inner) > LONG:  # of fixed height, so that lines may be broken inside
+        if BREAK in inner and len(inner) > LONG:  # of fixed height, so that lines can be broken inside
             return rf"\Bigl({inner}\Bigr)"
         return rf"\left({inner}\right)".replace(BREAK, "")
 
 
 def _numeric(x: ExactNumber | float) -> tuple[list[str], list[str]]:
-    """A number above and below the line."""
+    """A number as factors of numerator and denominator."""
     if not isinstance(x, ExactNumber):
         return [number(x)], []
     up = [str(x.numerator)] if x.numerator != 1 else []
@@ -159,7 +160,7 @@ def _numeric(x: ExactNumber | float) -> tuple[list[str], list[str]]:
 
 
 def juxtaposed(factors: Sequence[str]) -> str:
-    """Factors beside one another; words kept apart."""
+    """Factors side by side; words are separated."""
     out = ""
     for k, factor in enumerate(factors):
         word = WORD.match(factor) or (k and WORD.match(factors[k - 1]))
@@ -168,7 +169,7 @@ def juxtaposed(factors: Sequence[str]) -> str:
 
 
 def _braced(latex: str) -> str:
-    """A name to which an exponent may be put."""
+    """A name in braces if necessary, ready for an exponent."""
     return f"({latex})" if "^" in latex else latex
 
 

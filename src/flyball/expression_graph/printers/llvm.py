@@ -1,11 +1,11 @@
 """Expressions as LLVM code: straight-line code that reads numbers from memory and writes values of expressions.
 
-A function takes addresses and the time. What is read and written are *places*: a base (an address that is an
-argument, or that is stored where an argument points) and the index of the double there. Numba does not process
+The arguments of a function are addresses and the time. Values are read from and written to *places*: a base (an address
+that is an argument, or that is stored where an argument points) and the index of a double there. Numba does not process
 this code.
 
-Operations are ordered so that several independent chains are in progress and few registers are needed. The piece
-of a spline is searched once for all splines with the same breakpoints, beginning with the piece found last.
+Operations are ordered so that several independent chains run in parallel and few registers are needed. The segment of a
+spline is searched once for all splines with the same breakpoints, starting with the segment found last.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ import numpy as np
 from ...math.spline import BREAKS
 from ..graph import ADD, DIVIDE, MULTIPLY, NUMBER, POWER, Node
 
-PARALLEL_CHAINS = 4  # of a long chain of comparisons, how many go on side by side
+PARALLEL_CHAINS = 4  # number of parallel chains that a long chain of comparisons is split into
 
 
 def operands(x: Node) -> tuple[Node, ...]:
-    """What an operation is written with."""
+    """Operands of an operation as it is written."""
     return (x.op == "choose" and compared_pair(x)) or x.args
 
 
 def compared_pair(x: Node) -> tuple[Node, Node] | None:
-    """The two of which ``choose(a - b, a, b)`` is the larger; None if x is something else."""
+    """(a, b) if x is the larger of two, ``choose(a - b, a, b)``; else None."""
     by, a, b = x.args
     if by.op != ADD:
         return None
@@ -43,7 +43,7 @@ def compared_pair(x: Node) -> tuple[Node, Node] | None:
 
 
 def ordered_operations(nodes: Iterable[Any], loaded: Collection[int]) -> list[Node]:
-    """What has to be reckoned, or read, for these expressions, in the order in which it was made."""
+    """Operations and loads that these expressions need, in order of creation."""
     found: dict[int, Node] = {}
     to_see = [x for x in nodes if isinstance(x, Node)]
     while to_see:
@@ -56,7 +56,7 @@ def ordered_operations(nodes: Iterable[Any], loaded: Collection[int]) -> list[No
 
 
 def depth_first(nodes: Iterable[Any], loaded: Collection[int]) -> list[Node]:
-    """The same, each right before it is needed: values wait for less time, in registers."""
+    """Like `ordered_operations`, but each right before its use, so that values stay in registers for less time."""
     seen: set[int] = set()
     order: list[Node] = []
     for root in sorted({x.index: x for x in nodes if isinstance(x, Node)}.values(), key=lambda x: x.index):
@@ -75,16 +75,16 @@ def depth_first(nodes: Iterable[Any], loaded: Collection[int]) -> list[Node]:
 
 
 def parallel_chains(order: Sequence[Node], loaded: Collection[int]) -> dict[int, tuple[Node | None, list[Node]]]:
-    """Comparisons one after the other, as several chains abreast.
+    """Split long chains of comparisons into parallel chains.
 
-    For each of ``order`` that is the larger of two: an earlier one of its chain, or None, and what it is compared with.
+    For each node in ``order`` that is the larger of two: an earlier one of its chain, or None, and its comparands.
     """
     larger = {x.index for x in order if x.index not in loaded and x.op == "choose" and compared_pair(x)}
     uses: dict[int, int] = {}
     for x in order:
         for a in () if x.index in loaded else operands(x):
             uses[a.index] = uses.get(a.index, 0) + 1
-    behind: dict[int, list[Node]] = {}  # of each, the chain that it ends
+    behind: dict[int, list[Node]] = {}  # chain that ends at each node
     out: dict[int, tuple[Node | None, list[Node]]] = {}
     follows: set[int] = set()
     for x in order:
@@ -110,23 +110,23 @@ SearchKey = tuple[float, ...]
 
 
 def search_key(table: Sequence[float]) -> SearchKey:
-    """What of a spline's numbers says which piece holds."""
+    """Numbers of a spline that determine the segment of an argument."""
     return tuple(table[: BREAKS + int(table[1])])
 
 
 def spline_of(data: Any) -> tuple[Sequence[float], int] | None:
-    """Numbers of a spline and the order of its derivative; None if a function is none, or its numbers move."""
+    """Numbers of a spline and the order of its derivative; None if it is no spline or its numbers are not constant."""
     told = getattr(data, "told", {})
     return (told["table"], told["order"]) if "table" in told and not told["moved"] else None
 
 
 class SplineSegments:
-    """The pieces that one procedure has found.
+    """Spline segments found in one procedure.
 
     Parameters
     ----------
     new : callable
-        Writes an instruction, returns the name of its value.
+        Writes an instruction and returns the name of its value.
     """
 
     def __init__(self, new: Any) -> None:
@@ -136,7 +136,7 @@ class SplineSegments:
         self.read: dict[tuple[str, str], list[str]] = {}
 
     def value(self, table: tuple[str, Sequence[float]], order: int, x: str) -> str:
-        """A derivative of the spline of that name and those numbers at the number of that name."""
+        """Code for a derivative of a spline (name and numbers) at the value named x."""
         name, numbers = table
         breaks = search_key(numbers)
         if (breaks, x) not in self.found:
@@ -160,7 +160,7 @@ class SplineSegments:
         return total
 
     def two(self, operation: str, a: str, b: str) -> str:
-        """An operation on two numbers."""
+        """Code for an operation on two values."""
         return self.new(f"{operation} double {a}, {b}")
 
 
@@ -236,14 +236,14 @@ out:
 
 
 Place = tuple[str, int]
-"""A base and the number of the double there."""
+"""A base and the index of a double there."""
 
 LIBRARY = {
     "sin": "llvm.sin.f64", "cos": "llvm.cos.f64", "sqrt": "llvm.sqrt.f64", "exp": "llvm.exp.f64", "log": "llvm.log.f64",
     "absolute": "llvm.fabs.f64", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "sinh": "sinh",
     "cosh": "cosh", "tanh": "tanh",
 }  # fmt: skip
-"""Functions of one argument: intrinsics, and those of C's library."""
+"""Functions of one argument: intrinsics, and functions of the C library."""
 TWO_ARGUMENTS = {POWER: "llvm.pow.f64", "atan2": "atan2"}
 DECLARATIONS = "\n".join(
     [
@@ -255,33 +255,34 @@ DECLARATIONS = "\n".join(
 INFIX = {ADD: "fadd", MULTIPLY: "fmul", DIVIDE: "fdiv"}
 
 
-FAILED_CHECKS = {"positive": "ule", "nonzero": "ueq", "finite": "une"}  # against 0; "u": or no number
+FAILED_CHECKS = {"positive": "ule", "nonzero": "ueq", "finite": "une"}  # compared with 0; "u": true also for NaN
 
 
 class UnsupportedOperation(Exception):
-    """An expression has something in it that this language has no word for."""
+    """An expression contains an operation that this printer does not support."""
 
 
 def constant(x: float) -> str:
-    """A number, to the last bit."""
+    """A number as an exact constant."""
     return f"0x{struct.unpack('<Q', struct.pack('<d', x))[0]:016X}"
 
 
 @dataclass
 class Procedure:
-    """What a function does: it reads symbols at their places and puts expressions into theirs.
+    """A function: it reads symbols from their places and stores expressions in theirs.
 
     Attributes
     ----------
     name : str
-    reads : mapping of node number to place
-        What is there already: symbols, and what others have left.
+    reads : mapping of node index to place
+        Available values: symbols, and results of other procedures.
     stores : list of (place, expression)
     returned : node or number
     checks : list of (expressions, what, number)
-        Where one of these is not "positive", "nonzero" or "finite" the function returns that number, the first such.
+        If an expression is not "positive", "nonzero" or "finite", the function returns the number of the
+        first failed check.
     deep : bool
-        Whether what goes into a store stands next to it, or in the order in which it was made.
+        Whether operations are written right before their store, or in order of creation.
     """
 
     name: str
@@ -293,19 +294,19 @@ class Procedure:
 
     @property
     def results(self) -> list[Any]:
-        """All that is asked for."""
+        """All requested expressions."""
         return [x for _, x in self.stores] + [self.returned] + [x for nodes, _, _ in self.checks for x in nodes]
 
 
 class Module:
-    """Procedures of one kind, as text.
+    """Procedures with the same arguments, as text.
 
     Parameters
     ----------
     arguments : str
         As in ``define double @name(arguments)``; ``%t`` is the base "t".
     based : callable
-        Base -> lines that leave its address in ``%base``; none where it is an argument.
+        Base -> lines that compute its address ``%base``; none if it is an argument.
     """
 
     def __init__(self, arguments: str, based: Callable[[str], list[str]]) -> None:
@@ -315,13 +316,13 @@ class Module:
         self.tables: dict[bytes, Sequence[float]] = {}
 
     def table(self, numbers: Sequence[float]) -> str:
-        """The name of a table's numbers."""
+        """Name of the constant array of a table."""
         key = np.array(numbers, float).tobytes()
         self.tables.setdefault(key, numbers)
         return f"@table{list(self.tables).index(key)}"
 
     def scope(self, base: str) -> str:
-        """What tells LLVM that places of other bases are others."""
+        """Alias metadata: places of different bases do not overlap."""
         if base not in self.bases:
             self.bases.append(base)
         k = 3 * self.bases.index(base)
@@ -333,7 +334,7 @@ class Module:
         order = depth_first(p.results, p.reads) if p.deep else ordered_operations(p.results, p.reads)
         out.chains = parallel_chains(order, p.reads)
         overwritten = {place for place, _ in p.stores}
-        for x in order:  # what is overwritten is read first
+        for x in order:  # values that will be overwritten are read first
             if p.reads.get(x.index) in overwritten:
                 out.value(x)
         waiting: dict[int, list[Place]] = {}
@@ -430,7 +431,7 @@ class _Lines:
         raise UnsupportedOperation(getattr(x.data, "name", x.op))
 
     def largest(self, started: Node | None, others: Sequence[Node]) -> str:
-        """The largest of some, one of which may be the largest of others already."""
+        """Code for the largest of several values; ``started`` is the largest of others already."""
         names = [self.name(y) for y in (*((started,) if started is not None else ()), *others)]
         while len(names) > 1:
             a, b = names.pop(0), names.pop(0)
@@ -482,4 +483,4 @@ def _choose(o: _Lines, x: str, a: str, b: str) -> str:
 BRANCHING: dict[str, Callable[..., str]] = {
     "minimum": _minimum, "maximum": _maximum, "sign": _sign, "rounded": _rounded, "choose": _choose,
 }  # fmt: skip
-"""Functions that choose, as in `math/scalar.py`."""
+"""Functions that select a value, as in `math/scalar.py`."""

@@ -40,7 +40,7 @@ def mathml(x: Any, names: Mapping[int, str] | None = None, display: bool = False
 
 
 def formula(tex: str, display: bool = False) -> str:
-    """LaTeX as a ``math`` element: what stands in formulas of mechanics, not all of LaTeX."""
+    """LaTeX as a ``math`` element; supports the LaTeX of formulas written here, not all of LaTeX."""
     kind = ' display="block"' if display else ""
     return f"<math{kind}>{Converter(tex).row()}</math>"
 
@@ -54,14 +54,14 @@ def heavy(letter: str) -> str:
 
 
 class Converter:
-    """Reads LaTeX and writes MathML."""
+    """Converter from LaTeX to MathML."""
 
     def __init__(self, tex: str) -> None:
         self.tokens = [t for t in TOKEN.findall(tex) if not t.isspace()] if r"\text" not in tex else TOKEN.findall(tex)
         self.at = 0
 
     def row(self, *ends: str) -> str:
-        """Elements up to a token of ``ends``, which is left, as one element."""
+        """Elements up to a token of ``ends``, which is not consumed, as one element."""
         out: list[str] = []
         while self.at < len(self.tokens) and self.tokens[self.at] not in ends:
             made = self.scripted(self.element())
@@ -76,7 +76,7 @@ class Converter:
         return token
 
     def skipped(self) -> str:
-        """The next token that is no space, left where it is."""
+        """The next token that is no space, without consuming it."""
         while self.at < len(self.tokens) and self.tokens[self.at].isspace():
             self.at += 1
         return self.tokens[self.at] if self.at < len(self.tokens) else ""
@@ -104,7 +104,7 @@ class Converter:
         return out
 
     def scripted(self, base: str) -> str:
-        """An element with what is below and above it."""
+        """An element with its subscript and superscript."""
         below, above, count = "", "", 0
         while (token := self.skipped()) in ("_", "^", "'"):
             self.at += 1
@@ -141,7 +141,7 @@ class Converter:
         return f"<mo{flat}>{sign}</mo>"
 
     def command(self, name: str) -> str:
-        """What a command makes."""
+        """Element of a command."""
         if name in LETTERS:
             upright = ' mathvariant="normal"' if name[0].isupper() else ""
             return f"<mi{upright}>{LETTERS[name]}</mi>"
@@ -167,7 +167,7 @@ class Converter:
         return made if self.skipped() in ("(", r"\left", "") else made + THIN
 
     def styled(self, style: str) -> str:
-        """Letters of another kind."""
+        """Letters in another style."""
         if style != "bold":
             return f'<mi style="font-style:{style}">{escape(self.plain())}</mi>'
         return re.sub(r"<mi[^>]*>(.)</mi>|<mn>(\d)</mn>", lambda m: f"<mi>{heavy(m[1] or m[2])}</mi>", self.argument())
@@ -191,14 +191,14 @@ class Converter:
 
     @staticmethod
     def sign(token: str) -> str:
-        """A parenthesis that is as high as what it holds."""
+        """A parenthesis with the height of its content."""
         sign = SIGNS.get(token[1:], token[1:]) if token.startswith("\\") else token
         return "" if sign == "." else f'<mo stretchy="true">{escape(sign)}</mo>'
 
     def table(self, kind: str) -> str:
         """An environment of cells."""
         if kind == "array":
-            self.plain()  # how its columns stand
+            self.plain()  # column alignment
         rows, cells = [], []
         while self.at < len(self.tokens):
             cells.append(f"<mtd>{self.row('&', chr(92) * 2, chr(92) + 'end')}</mtd>")

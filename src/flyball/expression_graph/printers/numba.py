@@ -1,4 +1,4 @@
-"""Expressions as a module of functions that Numba compiles: the state of one mechanism in, arrays out."""
+"""Expressions as a module of functions compiled by Numba, from the state of one mechanism to arrays."""
 
 from __future__ import annotations
 

@@ -100,11 +100,11 @@ def _called(name, *numbers):
     return function(*numbers)
 ''',
 }  # fmt: skip
-"""Text of what the functions need."""
+"""Texts of helper functions."""
 
 
 def literal(x: float) -> str:
-    """A number that reads back to the last bit."""
+    """A number as text that reads back exactly."""
     return repr(float(x)) if np.isfinite(x) else "np.nan" if x != x else "np.inf" if x > 0.0 else "-np.inf"
 
 
@@ -115,7 +115,7 @@ def python_module(routines: Sequence[Routine], head: str, constants: Mapping[str
     ----------
     routines : sequence of Routine
     head : str
-        What the module's docstring says.
+        Text of the module's docstring.
     constants : mapping, optional
         Name -> numbers or texts: tuples of the module.
     """
@@ -190,7 +190,7 @@ def _function(r: Routine, language: Language) -> str:
 
 
 def docstring_escaped(text: str) -> str:
-    """Text inside a docstring."""
+    """Escape text for a docstring."""
     return text.strip().replace("\\", "\\\\").replace('"""', "'''")
 
 
@@ -199,7 +199,7 @@ def _default(a: Argument) -> str:
 
 
 def docstring(r: Routine, given: Sequence[str]) -> str:
-    """What a function takes and gives; ``given`` are its arguments' names."""
+    """Docstring of a function; ``given`` are the names of its arguments."""
     text = [f'"""{docstring_escaped(r.meaning) or r.name}', "", "Parameters", "----------"]
     for a, name in zip(r.arguments, given, strict=True):
         text.append(f"{name} : float" if a.single else f"{name} : ({len(a.nodes)},) array")

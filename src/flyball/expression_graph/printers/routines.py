@@ -1,8 +1,8 @@
-"""What all code printers share: functions to print, valid identifiers, tables, and expressions as statements.
+"""Shared parts of the code printers: functions to print, valid identifiers, tables, and expressions as statements.
 
-A subexpression that is used once stands where it is used, up to a width; one that is used more often becomes a
-statement of its own. Operations keep the order and association of the graph, so that every language computes the
-same to the last bit, as far as its elementary functions do.
+A subexpression that is used once is written in place, up to a width; one that is used more often becomes a statement.
+Operations keep the order and association of the graph, so that every language computes the same bits, apart from its
+elementary functions.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Function, Node
 
 
 class Identifiers:
-    """Gives each thing an identifier of its own, as near to what it is called as the language allows.
+    """Assigns unique identifiers, as close to the requested names as the language allows.
 
     Parameters
     ----------
     reserved : iterable of str
-        What the language or the generated code itself uses.
+        Identifiers of the language and of the generated code.
     """
 
     def __init__(self, reserved: Iterable[str] = ()) -> None:
         self._used = set(reserved)
 
     def __call__(self, requested: str) -> str:
-        """An identifier that nothing else has."""
+        """A unique identifier."""
         name = re.sub(r"\W+", "_", requested, flags=re.ASCII).strip("_") or "x"
         if name[0].isdigit():
             name = "x" + name
@@ -44,12 +44,13 @@ class Identifiers:
         return given
 
 
-MAX_OPERATIONS = 200_000  # operations from which on nothing is printed: compilers need minutes and gigabytes for more
+# Largest number of operations: compilers need minutes and gigabytes for more.
+MAX_OPERATIONS = 200_000
 
 
 @dataclass(frozen=True)
 class Argument:
-    """A number or an array of numbers that a function is given.
+    """An argument of a function: a number or an array of numbers.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Argument:
         One symbol for a number, several for an array.
     meaning : str
     values : tuple of float
-        What stands for it if it is left out; none if it has to be given.
+        Default values; empty if the argument is required.
     """
 
     name: str
@@ -68,7 +69,7 @@ class Argument:
 
     @property
     def single(self) -> bool:
-        """Whether it is one number and no array."""
+        """Whether it is a number, not an array."""
         return isinstance(self.symbols, Node)
 
     @property
@@ -93,7 +94,7 @@ class Routine:
         Scalars, vectors and matrices by name.
     meaning : str
     meanings : mapping of str to str
-        What each result is, with shape and unit.
+        Meaning of each result, with shape and unit.
     """
 
     name: str
@@ -118,20 +119,20 @@ class Routine:
 
     @property
     def operations(self) -> int:
-        """How many operations it takes: what is neither a symbol nor a number nor a mere change of sign."""
+        """Number of operations; symbols, numbers and changes of sign do not count."""
         return operation_count(self.nodes)
 
     def used(self) -> list[Function]:
-        """Functions that it calls and that are known by name only."""
+        """Called functions of which only the name is known."""
         return list({id(x.data): x.data for x in nodes_in_order(self.nodes) if x.op == CALL}.values())
 
     def check(self) -> None:
-        """Refuse what nobody could print.
+        """Refuse a routine that cannot be printed.
 
         Raises
         ------
         ModelError
-            If a symbol is no argument, or there are too many operations.
+            If a symbol is not an argument, or there are too many operations.
         """
         given = {x.index for a in self.arguments for x in a.nodes}
         foreign = [x.data.name for x in nodes_in_order(self.nodes) if x.op == SYMBOL and x.index not in given]
@@ -146,18 +147,18 @@ def refuse_too_long(name: str, operations: int) -> None:
     Raises
     ------
     ModelError
-        With how long it would be.
+        With the number of operations.
     """
     if operations > MAX_OPERATIONS:
         raise ModelError(
-            f"{name} takes {operations} operations, and straight-line code is written up to {MAX_OPERATIONS}: try the other "
-            "coordinates (absolute ones make long chains short), export functions that need less (M, f, G and gamma "
-            "rather than right_hand_side), or simulate it here, where loops over its elements are compiled"
+            f"{name} takes {operations} operations, and straight-line code is written up to {MAX_OPERATIONS}: try the "
+            "other coordinates (absolute ones make long chains short), export functions that need less (M, f, G and "
+            "gamma rather than right_hand_side), or simulate it here, where loops over its elements are compiled"
         )
 
 
 def operation_count(nodes: Iterable[Any]) -> int:
-    """Operations in expressions, those in common counted once, changes of sign not at all."""
+    """Number of operations in expressions; common ones count once, changes of sign do not count."""
     return sum(x.op not in (NUMBER, SYMBOL) and not is_negated(x) for x in nodes_in_order(nodes))
 
 
@@ -168,15 +169,15 @@ def is_negated(x: Node) -> bool:
 
 @dataclass(frozen=True)
 class Table:
-    """A spline as it is printed: see `math/spline.py` for what its numbers are."""
+    """A spline for printing; `math/spline.py` describes its numbers."""
 
     name: str
     data: tuple[float, ...]
-    moved: tuple[int, ...]  # numbers that are given with each call
+    moved: tuple[int, ...]  # indices of numbers that are arguments of each call
 
 
 def spline_tables(routines: Iterable[Routine], names: Identifiers) -> dict[int, Table]:
-    """Tables that routines call, by the identity of the function that is their value."""
+    """Tables that routines call, by the identity of the function for their value."""
     found: dict[int, Table] = {}
     for f in called_functions(routines):
         if "table" in f.told and id(f.told["value"]) not in found:
@@ -186,7 +187,7 @@ def spline_tables(routines: Iterable[Routine], names: Identifiers) -> dict[int, 
 
 
 def python_functions_of(routines: Iterable[Routine], names: Identifiers) -> dict[int, tuple[str, Function]]:
-    """Python functions that routines call: by identity a name of its own, and the function."""
+    """Python functions that routines call: identity -> (unique name, function)."""
     found = {}
     for f in called_functions(routines):
         if "table" not in f.told and "constant" not in f.told:
@@ -195,7 +196,7 @@ def python_functions_of(routines: Iterable[Routine], names: Identifiers) -> dict
 
 
 def called_functions(routines: Iterable[Routine]) -> list[Function]:
-    """Functions that are known by name only, in the order in which they are first called."""
+    """Called functions of which only the name is known, in the order of their first call."""
     return list({id(f): f for r in routines for f in r.used()}.values())
 
 
@@ -205,7 +206,7 @@ def refuse_python_functions(routines: Sequence[Routine], language: str) -> None:
     Raises
     ------
     ModelError
-        With the function's name and where it is called from.
+        With the name of the function and of its caller.
     """
     for r in routines:
         for f in r.used():
@@ -219,22 +220,22 @@ def refuse_python_functions(routines: Sequence[Routine], language: str) -> None:
 
 
 SUM, PRODUCT, ATOM = range(3)
-WIDTH = 60  # characters of what is put in place
-LINE = 116  # characters of a line
+WIDTH = 60  # largest width of a subexpression written in place
+LINE = 116  # characters per line
 
 
 @dataclass(frozen=True)
 class Language:
-    """What a language writes.
+    """Text generators of a language.
 
     Parameters
     ----------
     number : callable
-        A number that reads back to the last bit.
+        Writes a number that reads back exactly.
     functions : mapping
         Function of `math/scalar.py`, or "power" -> its text, with {0}, {1}, {2} for arguments.
     call : callable
-        Text of a function that is known by name only, of its arguments.
+        Writes the call of a function of which only the name is known.
     """
 
     number: Callable[[float], str]
@@ -243,7 +244,7 @@ class Language:
 
 
 class CodeFragment(NamedTuple):
-    """Text of an expression: what binds it, and whether it is the negative of what the text says."""
+    """Text of an expression, its binding strength, and whether the text lacks a minus sign."""
 
     text: str
     level: int = ATOM
@@ -251,11 +252,11 @@ class CodeFragment(NamedTuple):
 
     @property
     def whole(self) -> str:
-        """With its sign."""
+        """Text with its sign."""
         return "-" + self.bare(PRODUCT) if self.negative else self.text
 
     def bare(self, level: int) -> str:
-        """Without its sign, as a part of what binds as strongly as ``level``."""
+        """Text without its sign, as an operand of an operation with the binding strength ``level``."""
         return self.text if self.level >= level else f"({self.text})"
 
 
@@ -267,16 +268,16 @@ def fragment_of_number(language: Language, x: float) -> CodeFragment:
 def statements(
     language: Language, nodes: Sequence[Any], symbols: Mapping[int, str], temporary: Callable[[], str]
 ) -> tuple[list[tuple[str, str]], list[str]]:
-    """Temporaries and their texts, in order; and a text for each of ``nodes``.
+    """Temporary variables with their texts, in order; and a text for each of ``nodes``.
 
     Parameters
     ----------
     language : Language
     nodes : sequence of Node or number
     symbols : mapping
-        From a symbol's index to its text.
+        Symbol index -> text.
     temporary : callable
-        A name for one more of them.
+        Returns a new name of a temporary variable.
     """
     order = nodes_in_order(nodes)
     uses = Counter(without_sign(a).index for x in order if not is_negated(x) for a in x.args)
@@ -299,7 +300,7 @@ def statements(
 
 
 def without_sign(x: Node) -> Node:
-    """What stands behind a change of sign."""
+    """Operand of a change of sign; other nodes are returned unchanged."""
     return x.args[1] if is_negated(x) else x
 
 
@@ -335,7 +336,7 @@ def sum_text(a: CodeFragment, b: CodeFragment) -> CodeFragment:
 
 
 def wrapped_items(indent: str, items: Sequence[str]) -> list[str]:
-    """Items with commas behind them, in as many lines as it takes."""
+    """Items separated by commas, wrapped to lines."""
     rows: list[str] = []
     row = indent
     for x in items:

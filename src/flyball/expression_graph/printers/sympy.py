@@ -1,6 +1,6 @@
-"""Expressions to SymPy, and back: for reading and for SymPy's algebra, not for numerical work.
+"""Conversion of expressions to SymPy and back, for reading and for SymPy's algebra, not for numerical work.
 
-The way back covers what SymPy produces by algebra, differentiation and simplification: rational and trigonometric
+The conversion back supports results of SymPy's algebra, differentiation and simplification: rational and trigonometric
 expressions, roots, powers, cases, and functions that were passed by name.
 """
 
@@ -30,11 +30,11 @@ SYMPY_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "coth": lambda x: 1.0 / scalar.tanh(x),
     "Heaviside": lambda x, half=0.5: scalar.choose(x, 1.0, scalar.choose(-x, 0.0, half)),
 }  # fmt: skip
-"""SymPy's functions by their names."""
+"""SymPy's functions by name."""
 
 
 class SympyReader:
-    """One way back from SymPy."""
+    """One conversion from SymPy to nodes."""
 
     def __init__(self, printer: SympyPrinter, graph: Graph, symbols: dict[Any, Any]) -> None:
         self.printer, self.graph, self.sympy = printer, graph, printer.sympy
@@ -42,7 +42,7 @@ class SympyReader:
         self._known: dict[Any, Node] = {}
 
     def nodes(self, expressions: list[Any]) -> list[Node]:
-        """Nodes of expressions, each of which is looked at once."""
+        """Nodes of expressions; each subexpression is converted once."""
         wanted = [self.sympy.sympify(x) for x in expressions]
         to_do = list(wanted)
         while to_do:
@@ -57,7 +57,7 @@ class SympyReader:
         return [self._known[x] for x in wanted]
 
     def _parts(self, x: Any) -> list[Any]:
-        """What has to be known before an expression can be made."""
+        """Subexpressions that must be converted first."""
         sp = self.sympy
         if x.is_number and x.is_real and not x.args:
             return []
@@ -138,7 +138,7 @@ class SympyReader:
         return found
 
     def _slope(self, x: Any) -> Any:
-        """Derivatives of a function that is known by name, by its first argument."""
+        """Derivatives, by the first argument, of a function of which only the name is known."""
         call, args = x, list(x.args)
         at: dict[Any, Any] = {}
         if isinstance(x, self.sympy.Subs):
@@ -155,7 +155,7 @@ class SympyReader:
 
 
 def choose_by_relation(relation: str, less: Any, a: Any, b: Any) -> Any:
-    """A where ``less`` (left minus right) fulfils a relation, else b."""
+    """Expression a where ``less`` (left minus right) fulfils a relation, else b."""
     if relation == "StrictGreaterThan":
         return scalar.choose(less, a, b)
     if relation == "StrictLessThan":
@@ -173,33 +173,33 @@ def sum_of(args: Sequence[Any]) -> Any:
 
 
 def nested(f: Callable[[Any, Any], Any], args: Sequence[Any]) -> Any:
-    """F(f(a, b), c) ..."""
+    """Nested calls f(f(a, b), c) ..."""
     found = args[0]
     for a in args[1:]:
         found = f(found, a)
     return found
 
 
-MAX_DENOMINATOR = 10_000  # denominators of numbers that are taken for fractions
-MAX_DIGITS = 9  # of decimals that are
-MAX_ANGLE_DENOMINATOR = 720  # denominators of parts of pi
-ROUNDING = 4.0  # spacings by which a number may miss the fraction that it is taken for
-POSITIVE = ("kg", "kg*m^2", "kg m^2", "kg*m**2")  # units of what is greater than zero wherever it is not zero
+MAX_DENOMINATOR = 10_000  # largest denominator of numbers recognised as fractions
+MAX_DIGITS = 9  # largest number of digits of recognised decimals
+MAX_ANGLE_DENOMINATOR = 720  # largest denominator of recognised fractions of pi
+ROUNDING = 4.0  # tolerance of the recognition, in spacings of floating-point numbers
+POSITIVE = ("kg", "kg*m^2", "kg m^2", "kg*m**2")  # units of quantities that are positive unless zero
 
 
 class SympyPrinter:
-    """Expressions of one graph as SymPy expressions, and these as expressions again.
+    """Converter between expressions of one graph and SymPy expressions.
 
     Parameters
     ----------
     tables : {"function", "piecewise"}
-        Tables (splines) as functions that are known by name, or as their cubics.
+        Tables (splines) as named functions, or as their cubics.
     fractions : bool
-        Whether numbers that are short fractions or decimals, or such parts of pi, become exact ones. They do if they
-        are that number within rounding. Others are floats of 17 digits.
+        Whether numbers that equal short fractions, decimals or such parts of pi within rounding become exact numbers.
+        Others are floats of 17 digits.
     positive : collection of str
-        Names of further symbols that are greater than zero. Masses and moments of inertia are, where they have a value
-        that is. All symbols are real.
+        Names of further positive symbols. Masses and moments of inertia with a positive value are positive. All symbols
+        are real.
     """
 
     def __init__(self, tables: str = "function", fractions: bool = True, positive: Collection[str] = ()) -> None:
@@ -207,14 +207,14 @@ class SympyPrinter:
             raise ModelError(f"tables={tables!r}: must be 'function' or 'piecewise'")
         self.sympy = import_optional("sympy", "symbolic")
         self.tables, self.fractions, self.positive = tables, fractions, set(positive)
-        self.symbols: dict[Any, Node] = {}  # what SymPy's symbols stand for
-        self.functions: dict[str, Function] = {}  # and its functions
+        self.symbols: dict[Any, Node] = {}  # SymPy symbol -> node
+        self.functions: dict[str, Function] = {}  # name of a SymPy function -> function
         self._names = Identifiers()
         self._called: dict[Function, str] = {}
         self._known: dict[int, Any] = {}
 
     def __call__(self, x: Any) -> Any:
-        """SymPy's expression of a node or number; a list, or a ``Matrix`` of a vector or matrix of these."""
+        """SymPy expression of a node or number; a list, or a ``Matrix`` of a vector or matrix of these."""
         if isinstance(x, np.ndarray):
             flat = self._expressions(x.ravel().tolist())
             rows = x.shape[0]
@@ -229,15 +229,15 @@ class SympyPrinter:
         Parameters
         ----------
         expressions : iterable
-            Of SymPy expressions.
+            SymPy expressions.
         graph : Graph
         symbols : mapping, optional
-            From SymPy's symbols, or their names, to nodes or numbers, for those that this printer has not made.
+            SymPy symbols or their names -> nodes or numbers, for symbols that this printer has not created.
 
         Raises
         ------
         ModelError
-            Where a symbol or a function is not known.
+            If a symbol or a function is unknown.
         """
         return SympyReader(self, graph, dict(symbols or {})).nodes(list(expressions))
 
@@ -248,7 +248,7 @@ class SympyPrinter:
         return [self._known[x.index] if isinstance(x, Node) else self.number(float(x)) for x in xs]
 
     def number(self, x: float) -> Any:
-        """A number; exact if it is meant to be."""
+        """A number; exact if it is recognised as such."""
         sp = self.sympy
         if not math.isfinite(x):
             return sp.nan if x != x else sp.oo if x > 0.0 else -sp.oo
@@ -287,7 +287,7 @@ class SympyPrinter:
         return expression(sp, x.op, args)
 
     def _called_by_name(self, x: Node, args: list[Any]) -> Any:
-        """A table's piece by piece, if wanted; else a function, derivatives of which are SymPy's."""
+        """A table as ``Piecewise`` if requested; else a named function with SymPy derivatives."""
         told, order = x.data.told, 0
         if "table" in told:
             order = told["order"]
@@ -312,7 +312,7 @@ class SympyPrinter:
 
 
 def fraction(x: float) -> Fraction | None:
-    """The short fraction or decimal that a number is within rounding."""
+    """The short fraction or decimal that a number equals within rounding; None if there is none."""
     short = _near(x, MAX_DENOMINATOR)
     if short is not None:
         return short

@@ -22,19 +22,19 @@ def text(x: Any, names: Mapping[int, str] | None = None) -> str:
     ----------
     x : Node or number
     names : mapping of int to str, optional
-        Nodes that have a name of their own (`naming.named`), by their index.
+        Names of nodes that are not written out, by node index.
     """
     return TextPrinter(names).expression(x)
 
 
 class TextPrinter:
-    """Writes expressions as text."""
+    """Printer of expressions as text."""
 
     def __init__(self, names: Mapping[int, str] | None = None) -> None:
         self.layout = Layout(names)
 
     def expression(self, x: Any, top: bool = False) -> str:
-        """A sum; ``top``: written out though it has a name."""
+        """A sum; ``top``: written out even if it has a name."""
         if not isinstance(x, Node):
             return number(x)
         return self.signed(self.layout.sum(x, top), top)
@@ -101,17 +101,17 @@ class TextPrinter:
 
 
 def broken_lines(line: str, width: int) -> list[str]:
-    """A line in pieces that are no longer than ``width``, where there are signs to break before."""
+    """Break a line before signs into parts of at most ``width`` characters."""
     return [line.strip() for line in wrap_fragments(re.split(r"(?= [-+=] )", line), width)]
 
 
 def number(x: Any) -> str:
-    """A number that is no node."""
+    """A number that is not a node."""
     return number_text(float(x))
 
 
 def matrix(rows: np.ndarray | Sequence[Sequence[Any]], names: Mapping[int, str] | None = None) -> str:
-    """A matrix, its columns under one another; zeros are dots."""
+    """A matrix with aligned columns; zeros are dots."""
     printer = TextPrinter(names)
     cells = [["." if x == 0.0 else printer.expression(x) for x in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]

@@ -2,8 +2,8 @@
 
     w = atan2(y, x):   cos w = x / r,   sin w = y / r,   r^2 = x^2 + y^2
 
-Sums of angles follow by the addition theorems; whole turns are dropped. For reading only: a parameter keeps the
-sign of its own value, so that sqrt(l^2) = l for a length.
+Sums of angles follow from the addition theorems; whole turns are dropped. For reading only: a parameter keeps the sign
+of its own value, so that sqrt(l^2) = l for a length.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ..graph import ADD, MULTIPLY, NUMBER, SYMBOL, Node
 from .simplify import simplified
 
 FULL_TURN = 2.0 * math.pi
-MAX_OPERATIONS = 300  # operations up to which cosine and sine of an angle are made short
-MAX_FACTOR = 3  # times an angle may be counted in a sum
+MAX_OPERATIONS = 300  # up to so many operations the cosine and sine of an angle are simplified
+MAX_FACTOR = 3  # largest factor of an angle in a sum
 
 ArctangentWave = tuple[Any, Any, list[Node]]
-"""Cosine and sine of an angle times factors, and the squares of these."""
+"""Cosine and sine of an angle, each times factors, and the squares of these factors."""
 
 
 class ArctangentSubstitution:
-    """Expressions without sines and cosines of arctangents, formulas put in; each expression of the graph is seen once.
+    """Replaces sines and cosines of arctangents and substitutes formulas; each node is processed once.
 
     Parameters
     ----------
     definitions : sequence of (Node, Node, Node or None)
-        Symbol, its formula from symbols before it, and sqrt(x^2 + y^2) where that is atan2(y, x) and it is known.
+        Symbol, its formula in earlier symbols, and, if it is atan2(y, x), sqrt(x^2 + y^2) if known.
     """
 
     def __init__(self, definitions: Iterable[tuple[Node, Any, Any]] = ()) -> None:
@@ -51,7 +51,7 @@ class ArctangentSubstitution:
             self._known[w.index] = self([without_whole_turns(y)])[0]
 
     def __call__(self, nodes: Sequence[Any]) -> list[Any]:
-        """Expressions in which no symbol with a formula is left."""
+        """Substitute all symbols that have a formula."""
         for x in nodes_in_order(nodes):
             if x.index not in self._known:
                 self._known[x.index] = self._constructed(x)
@@ -67,7 +67,7 @@ class ArctangentSubstitution:
         return x if same else x.graph.rebuilt(x, args)
 
     def _parts(self, x: Node) -> dict[Node, float]:
-        """An angle as a sum of symbols and arctangents with factors; whole turns are nothing."""
+        """An angle as a sum of symbols and arctangents with factors, without whole turns."""
         found: dict[Node, float] = {}
         to_see = [(x, 1.0)]
         while to_see:
@@ -86,7 +86,7 @@ class ArctangentSubstitution:
         return {y: c for y, c in found.items() if c}
 
     def _wave(self, angle: Node) -> tuple[Node, Node] | None:
-        """Cosine and sine of an angle that holds arctangents; None if it has none."""
+        """Cosine and sine of an angle that contains arctangents; None if it contains none."""
         parts = self._parts(angle)
         arcs = [(y, c) for y, c in parts.items() if y.op == "atan2"]
         if not arcs or any(c != round(c) or abs(c) > MAX_FACTOR for _, c in arcs):
@@ -110,7 +110,7 @@ class ArctangentSubstitution:
         return made[0], made[1]
 
     def _of(self, y: Node) -> ArctangentWave:
-        """Of an arctangent."""
+        """Cosine and sine of an arctangent."""
         if y.index not in self._waves:
             b, a = fast_simplification(self(y.args))
             self._waves[y.index] = (a, b, fast_simplification([a * a + b * b]))
@@ -118,7 +118,7 @@ class ArctangentSubstitution:
 
 
 def without_whole_turns(y: Node) -> Node:
-    """An angle without the whole turns that go on counting."""
+    """An angle without its term that counts whole turns."""
     if y.op == ADD:
         a, b = y.args
         for one, other in ((a, b), (b, a)):
@@ -128,14 +128,14 @@ def without_whole_turns(y: Node) -> Node:
 
 
 def fast_simplification(nodes: Sequence[Node]) -> list[Node]:
-    """Made short if that is quick; absolute values of parameters are these, with the sign that they have."""
+    """Simplify if that is quick; absolute values of parameters are resolved by the sign of their values."""
     if len(nodes_in_order(nodes)) > MAX_OPERATIONS:
         return list(nodes)
     return without_absolute_values(simplified(list(nodes)))
 
 
 def without_absolute_values(nodes: Sequence[Any]) -> list[Any]:
-    """Absolute values of what does not move, with its sign in place of the bars."""
+    """Resolve absolute values of expressions of parameters by the sign of their values."""
     known: dict[int, Node] = {}
     for x in nodes_in_order(nodes):
         args = tuple(known[a.index] for a in x.args)

@@ -1,4 +1,4 @@
-"""Symbols for subexpressions that recur, or that are too long to stand inside others."""
+"""Symbols for common subexpressions, and for long ones inside others."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from ..graph import ADD, MULTIPLY, NUMBER, SYMBOL, Graph, Node, Symbol
 from .reading_cost import reading_cost, symbol_count
 from .simplify import simplified
 
-MIN_GAIN = 12.0  # symbols that a name saves, from which on it is given
-LONG_COST = 60.0  # symbols in a factor or an argument, from which on it has a name
-SHORT_COST = 4.0  # what is as short is written out
+MIN_GAIN = 12.0  # a subexpression gets a name if that saves so many symbols
+LONG_COST = 60.0  # a factor or argument with so many symbols gets a name
+SHORT_COST = 4.0  # expressions up to this length are written out
 
 Definitions = list[tuple[Node, Node]]
-"""Symbols and what they stand for, in an order of evaluation."""
+"""Symbols and their definitions, in an order of evaluation."""
 
 
 def extract_common_subexpressions(
     nodes: Sequence[Any], gain: float = MIN_GAIN, long: float = LONG_COST
 ) -> tuple[list[Any], Definitions]:
-    """Expressions with symbols for parts that are long and stand there more than once.
+    """Replace long parts that occur more than once by symbols.
 
     Parameters
     ----------
     nodes : sequence of Node or number
     gain, long : float
-        Symbols that a name must save; length from which on a factor or an argument has a name, though it stands once.
+        Symbols that a name must save; length above which a factor or an argument gets a name even if it occurs once.
 
     Returns
     -------
     list, list of (Node, Node)
-        The expressions, and what the symbols stand for.
+        The expressions, and the definitions of the symbols.
     """
     order = [x for x in nodes_in_order(nodes) if x.op not in (NUMBER, SYMBOL)]
     uses, inside = _uses(order)
@@ -57,13 +57,13 @@ def extract_common_subexpressions(
 
 
 def _symbol_letter(graph: Graph) -> str:
-    """Of the symbols (w_1, w_2, ...): one that no symbol of the graph has with a number behind."""
+    """Letter of the symbols (w_1, w_2, ...) that no numbered symbol of the graph uses."""
     taken = {x.data.name.partition("_")[0] for x in graph if x.op == SYMBOL and "_" in x.data.name}
     return next(x for x in (*"wchkb", *(f"w{n}" for n in range(len(taken) + 1))) if x not in taken)
 
 
 def _uses(order: Sequence[Node]) -> tuple[dict[int, int], set[int]]:
-    """How often an operation stands in others; which sums stand in something else than a sum."""
+    """Number of uses of each operation; and the sums that occur in something other than a sum."""
     uses: dict[int, int] = defaultdict(int)
     inside: set[int] = set()
     for x in order:
@@ -75,17 +75,17 @@ def _uses(order: Sequence[Node]) -> tuple[dict[int, int], set[int]]:
     return uses, inside
 
 
-MAX_OPERATIONS = 600  # operations up to which all is simplified before parts get names
-READABLE_COST = 2500.0  # symbols of all expressions together up to which that is kept
+MAX_OPERATIONS = 600  # up to so many operations expressions are simplified before parts get names
+READABLE_COST = 2500.0  # that result is kept up to so many symbols in all expressions
 
 
 def simplified_with_symbols(
     nodes: Sequence[Any], units: Sequence[Sequence[Node]] = ()
 ) -> tuple[list[Any], Definitions]:
-    """Expressions of the same value, short, with symbols for what recurs, and what these stand for.
+    """Short expressions of the same value, with symbols for common subexpressions and their definitions.
 
-    Small ones are simplified as a whole. In large ones what recurs has a name first, and each piece is simplified by
-    itself: that takes time in proportion to the operations, and cannot swell.
+    Small expressions are simplified as a whole. In large ones common subexpressions get names first, and each piece is
+    simplified by itself: the time is proportional to the number of operations, and the result does not grow.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def simplified_with_symbols(
     Returns
     -------
     list, list of (Node, Node)
-        The expressions, and symbols with what they stand for, in an order of evaluation.
+        The expressions, and symbols with their definitions, in an order of evaluation.
     """
     if len(nodes_in_order(nodes)) <= MAX_OPERATIONS:
         found = simplified(nodes, units)

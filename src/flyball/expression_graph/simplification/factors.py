@@ -14,15 +14,15 @@ from ..graph import ADD, DIVIDE, MULTIPLY, NUMBER, Graph, Node
 from .reading_cost import fraction, reading_cost, without_rounding
 
 QuadraticTerm = tuple[float, dict[int, int]]
-EQUAL_TOLERANCE = 1e-12  # of the two numbers whose difference it is: what may be none, if the product proves it
-ROUNDING_TOLERANCE = 2e-15  # of the very same coefficient: what the product may differ by
-CONSTANT_ATOM = -1  # an atom for what is no power of any
+EQUAL_TOLERANCE = 1e-12  # a difference of two numbers below this part of them may be zero, if the product confirms it
+ROUNDING_TOLERANCE = 2e-15  # relative difference allowed between a coefficient and that of the product
+CONSTANT_ATOM = -1  # atom of terms without powers
 
 
 def quadratic_as_product(terms: list[QuadraticTerm]) -> tuple[list[QuadraticTerm], list[QuadraticTerm]] | None:
-    """Two sums whose product a sum is, if all its terms are of second order and there are two such sums.
+    """Two sums whose product is the given sum, if all its terms are of second order; None if there are none.
 
-    As a polynomial of one of the atoms it is a x^2 + b x + c, whose factors are real sums where b^2 - 4 a c is the
+    As a polynomial in one of the atoms the sum is a x^2 + b x + c. Its factors are real sums if b^2 - 4 a c is the
     square of a sum.
     """
     if len(terms) < 3 or len(terms) > 36:
@@ -51,7 +51,7 @@ LinearForm = dict[int, float]
 def _solve_for_atom(
     form: dict[tuple[int, int], float], atoms: list[int], k: int
 ) -> tuple[LinearForm, LinearForm] | None:
-    """Factors of the form as a polynomial of atom k."""
+    """Factors of the form as a polynomial in atom k."""
     a = form.get((k, k), 0.0)
     if a == 0.0:
         return None
@@ -74,7 +74,7 @@ def _solve_for_atom(
 
 
 def _atom_coefficients(a: float, b: float, root: float, c: float) -> tuple[float, float]:
-    """The coefficients of an atom in both sums, whose product is c: the smaller by the larger one."""
+    """Coefficients of an atom in both sums, with the product c; the smaller one is computed from the larger."""
     size = abs(b) + abs(root)
     if abs(b + root) >= abs(b - root):
         first = 0.5 * (b + root)
@@ -86,7 +86,7 @@ def _atom_coefficients(a: float, b: float, root: float, c: float) -> tuple[float
 
 
 def _is_product(form: dict[tuple[int, int], float], first: LinearForm, second: LinearForm) -> bool:
-    """Whether the product of two sums is the form, each coefficient but for its own rounding.
+    """Whether the product of two sums is the form, each coefficient within its own rounding.
 
     Coefficients of different atoms are not compared: they have different units.
     """
@@ -104,7 +104,7 @@ def _is_product(form: dict[tuple[int, int], float], first: LinearForm, second: L
 
 
 def _square_root_form(square: dict[tuple[int, int], float], atoms: list[int]) -> LinearForm | None:
-    """The sum whose square a form is."""
+    """The sum whose square is the form; None if there is none."""
     if any(square[i, i] < 0.0 for i in atoms):
         return None
     lead = next((i for i in atoms if square[i, i] > 0.0), None)
@@ -121,7 +121,7 @@ def _square_root_form(square: dict[tuple[int, int], float], atoms: list[int]) ->
 
 
 def _with_smaller_numbers(first: LinearForm, second: LinearForm) -> tuple[LinearForm, LinearForm]:
-    """Both with the smaller numbers: a factor that all of one have goes to the other where that leaves whole ones."""
+    """Move a common numeric factor from one sum to the other where that leaves integers."""
     smallest = min(abs(c) for c in second.values() if c)
     if smallest < 1.0:
         first, second = {i: c * smallest for i, c in first.items()}, {i: c / smallest for i, c in second.items()}
@@ -133,17 +133,17 @@ Term = tuple[float, dict[int, int]]
 
 
 class Factorizer:
-    """Makes nodes of terms."""
+    """Converts terms to factored nodes."""
 
     def __init__(self, graph: Graph, costs: dict[int, float]) -> None:
         self.graph, self.costs = graph, costs
 
     def weight(self, powers: dict[int, int]) -> float:
-        """Length of a product."""
+        """Length of a product to read."""
         return sum(reading_cost(self.graph.nodes[k], self.costs) + 0.4 * (abs(n) - 1) for k, n in powers.items())
 
     def product(self, c: float, powers: dict[int, int]) -> Node:
-        """A number times powers."""
+        """Node for a number times powers."""
         above: Any = without_rounding(c)
         below: Any = 1.0
         for k in sorted(powers):
@@ -155,7 +155,7 @@ class Factorizer:
         return self.graph.divide(above, below)
 
     def __call__(self, terms: list[Term]) -> Node:
-        """The sum of terms."""
+        """Node for a sum of terms."""
         if not terms:
             return self.graph.number(0.0)
         if len(terms) == 1:
@@ -167,7 +167,7 @@ class Factorizer:
         return self.graph.multiply(self.product(c, powers), self.split(rest))
 
     def split(self, terms: list[Term]) -> Node:
-        """A sum without a common factor: as a product of two sums, or with factors of some of its terms pulled out."""
+        """Node for a sum without a common factor: a product of two sums, or partly factored."""
         factors = quadratic_as_product(terms)
         if factors is not None:
             first, second = (self.summed(x) for x in factors)
@@ -192,7 +192,7 @@ class Factorizer:
         return self.again(total)
 
     def again(self, x: Node) -> Node:
-        """A sum whose terms have got a common factor, a sum itself, with this pulled out."""
+        """Extract a common factor that is itself a sum."""
         terms = terms_of_sum(x)
         powers = common_powers([p for _, p in terms])
         if not powers or len(terms) < 2:
@@ -201,14 +201,14 @@ class Factorizer:
         return self.graph.multiply(self.product(1.0, powers), self(rest))
 
     def saved(self, terms: list[Term]) -> float:
-        """How much shorter a sum is with its common factor pulled out."""
+        """Symbols saved by extracting the common factor of a sum."""
         powers = common_powers([p for _, p in terms])
         alone = sum(1.0 for c, p in terms if p == powers)
         again = any(k in powers for _, p in terms for k in powers_quotient(p, powers))  # l (l + 2 r) reads no better
         return (len(terms) - 1) * self.weight(powers) - alone - (2.6 if again else 0.9)
 
     def summed(self, terms: list[Term]) -> Node:
-        """The sum as it stands."""
+        """Node for a sum without factoring."""
         total: Any = 0.0
         for c, p in terms:
             total = self.graph.node(total) + self.product(c, p)
@@ -216,7 +216,7 @@ class Factorizer:
 
 
 def factors_of(x: Node, barriers: Container[int] = ()) -> Term:
-    """A node as a number times powers of nodes that are no products; ``barriers`` are not looked into."""
+    """A node as a number times powers of nodes that are no products; ``barriers`` are not expanded."""
     c: float = 1.0
     powers: dict[int, int] = {}
     to_see = [(x, 1)]
@@ -232,7 +232,7 @@ def factors_of(x: Node, barriers: Container[int] = ()) -> Term:
 
 
 def terms_of_sum(x: Node, barriers: Container[int] = ()) -> list[Term]:
-    """Terms of a sum as they stand."""
+    """Terms of a sum without expansion."""
     out: list[Term] = []
     to_see = [(x, 1.0)]
     while to_see:
@@ -270,7 +270,7 @@ def powers_quotient(p: dict[int, int], by: dict[int, int]) -> dict[int, int]:
 
 
 def numeric_content(numbers: list[float]) -> float:
-    """A numeric factor to pull out: the smallest number, where all are whole multiples of it and fewer are left."""
+    """Common numeric factor: the smallest number, if all are integer multiples of it and that shortens the sum."""
     smallest = min(map(abs, numbers))
     sign = -1.0 if all(x < 0.0 for x in numbers) else 1.0
     parts = [fraction(x, 48) for x in numbers]
@@ -289,5 +289,5 @@ def numeric_content(numbers: list[float]) -> float:
 
 
 def number_cost(x: float) -> int:
-    """Digits' places that a number takes: none for one, two for a fraction."""
+    """Length of a number to read: 0 for one, 2 for a fraction."""
     return 0 if abs(x) == 1.0 else 1 if x == round(x) else 2

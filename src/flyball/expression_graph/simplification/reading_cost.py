@@ -1,4 +1,4 @@
-"""How long an expression is to read, and which floats are short fractions, roots or multiples of pi."""
+"""Length of an expression to read, and recognition of short fractions, roots and multiples of pi."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any
 
 from ..graph import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node
 
-ROUNDING_FACTOR = 4.0 * 2.0**-52  # relative: what rounding makes of a number
-LARGEST = 100_000  # numerators above are better read as decimals
+ROUNDING_FACTOR = 4.0 * 2.0**-52  # relative rounding error of a number
+LARGEST = 100_000  # larger numerators are written as decimals
 DENOMINATORS = 720
 ROOTS = (2, 3, 5, 6, 7, 10)
 
 
 @dataclass(frozen=True)
 class ExactNumber:
-    """A number as fraction times the root of a small number, or times pi."""
+    """A number as a fraction times the root of a small number, or times pi."""
 
     numerator: int
     denominator: int
@@ -29,7 +29,7 @@ class ExactNumber:
 
 @lru_cache(maxsize=65536)
 def fraction(x: float, largest: int = DENOMINATORS) -> Fraction | None:
-    """The short fraction that a number is, if it is one."""
+    """The short fraction that a number equals; None if there is none."""
     if not math.isfinite(x) or abs(x) > LARGEST:
         return None
     found = Fraction(x).limit_denominator(largest)
@@ -40,7 +40,7 @@ def fraction(x: float, largest: int = DENOMINATORS) -> Fraction | None:
 
 @lru_cache(maxsize=65536)
 def exact_number(x: float) -> ExactNumber | None:
-    """What a reader knows a number as; None if it is best written as a decimal."""
+    """Exact form of a number for display; None if a decimal is better."""
     found = fraction(x)
     if found is not None:
         q = found.denominator
@@ -60,7 +60,7 @@ def exact_number(x: float) -> ExactNumber | None:
 
 @lru_cache(maxsize=65536)
 def without_rounding(x: float) -> float:
-    """A number without the rounding that has gathered in it, where it is plainly a short one."""
+    """Remove accumulated rounding from a number that is clearly a short one."""
     if x == 0.0 or not math.isfinite(x):
         return x
     found = fraction(x, 48)
@@ -74,7 +74,7 @@ LARGEST_COST = 1e9
 
 
 def reading_cost(x: Node, costs: dict[int, float]) -> float:
-    """Symbols, numbers and functions that a reader meets; ``costs`` keeps what is known."""
+    """Number of symbols, numbers and functions in an expression; ``costs`` is a cache."""
     to_see = [x]
     while to_see:
         y = to_see[-1]
@@ -91,7 +91,7 @@ def reading_cost(x: Node, costs: dict[int, float]) -> float:
 
 
 def symbol_count(nodes: Iterable[Any]) -> float:
-    """Symbols that a reader meets in all of them."""
+    """Total reading length of several expressions."""
     costs: dict[int, float] = {}
     return sum(reading_cost(x, costs) for x in nodes if isinstance(x, Node))
 

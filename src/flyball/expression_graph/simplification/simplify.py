@@ -36,19 +36,20 @@ from .terms import (
     without_squares,
 )
 
-FEW_TERMS = 12  # that sums may have where expressions are large
-WORK_BUDGET = 100_000  # products of terms, or their like, after which they are
+FEW_TERMS = 12  # terms of a sum in large expressions
+# Work (products of terms and similar) after which expressions count as large.
+WORK_BUDGET = 100_000
 
 
 class Expander:
-    """Nodes of one graph as sums of terms; each node once.
+    """Expands nodes of one graph into sums of terms; each node once.
 
     Parameters
     ----------
     parent : Simplifier
-        Makes what is no sum of terms short: arguments of functions, denominators, sums that are too long.
+        Simplifies what is no sum of terms: arguments of functions, denominators, sums that are too long.
     most : int
-        Terms that a sum may have.
+        Largest number of terms of a sum.
     """
 
     def __init__(self, parent: Simplifier, most: int) -> None:
@@ -57,7 +58,7 @@ class Expander:
         self.spent = 0
 
     def __call__(self, x: Node) -> Terms:
-        """Terms of a node whose arguments are known, or become so."""
+        """Terms of a node; its arguments are expanded first."""
         found = self.known.get(x.index)
         if found is None:
             found = self.known[x.index] = self._terms(x)
@@ -81,13 +82,13 @@ class Expander:
         return self.atom(self.parent.inside(x))
 
     def spend(self, work: int) -> None:
-        """Count work; from a certain amount on sums are kept shorter."""
+        """Count work; above the budget, sums are kept shorter."""
         self.spent += work
         if self.spent > WORK_BUDGET:
             self.most = min(self.most, FEW_TERMS)
 
     def atom(self, x: Node) -> Terms:
-        """A node as it stands."""
+        """A node as one atom."""
         return {(((x.index, 1),), ()): 1.0}
 
     def factor(self, terms: Terms) -> Terms:
@@ -115,7 +116,7 @@ class Expander:
         return without_squares(found, self.parent.units) if self.parent.units else found
 
     def roots_squared(self, terms: Terms) -> Terms:
-        """Squares of roots and of absolute values are what stands in them."""
+        """Replace squares of roots and of absolute values by their arguments."""
         out: Terms = {}
         for (powers, waves), c in terms.items():
             rest: Terms = {(powers, waves): c}
@@ -142,7 +143,7 @@ class Expander:
 
     def _quotient(self, x: Node) -> Terms:
         a, b = self(x.args[0]), self(x.args[1])
-        if not b:  # as it is: 1 / 0
+        if not b:  # kept as it is: 1 / 0
             return self.atom(self.parent.inside(x))
         same = ratio_of_terms(a, b)
         if same is not None:
@@ -161,7 +162,7 @@ class Expander:
         return self.roots_squared(out)
 
     def angle(self, x: Node) -> Angle | None:
-        """An expression as a sum of atoms with factors; None if it has too many."""
+        """An angle as a sum of atoms with factors; None if it has too many terms."""
         terms = self(x)
         if len(terms) > 8:
             return None
@@ -178,7 +179,7 @@ class Expander:
         return tuple(sorted((k, c) for k, c in found.items() if c))
 
     def _wrapped(self, x: Node) -> Angle | None:
-        """U in atan2(sin u, cos u), which differs from it by whole turns."""
+        """The angle u of atan2(sin u, cos u), which differs from it by whole turns."""
         if x.op != "atan2" or x.index in self.parent.barriers:
             return None
         y, z = (self(a) for a in x.args)
@@ -196,7 +197,7 @@ class Expander:
         kind = COS if x.op == "cos" else SIN
         found = dict(angle)
         quarter, c = right_angles(found.get(CONSTANT_ATOM, 0.0)), 1.0
-        if quarter:  # a whole number of right angles in front
+        if quarter:  # a multiple of a right angle is the constant term
             del found[CONSTANT_ATOM]
             steps = (quarter + (0 if kind == SIN else 1)) % 4  # sin(x + n pi/2)
             kind, c = (SIN, COS, SIN, COS)[steps], (1.0, 1.0, -1.0, -1.0)[steps]
@@ -235,7 +236,7 @@ class Expander:
 
 
 def shifted_wave(kind: int, angle: dict[int, float], phase: float, c: float) -> Terms:
-    """C times cosine or sine of an angle and a number: cos(u + p) = cos p cos u - sin p sin u."""
+    """c times cosine or sine of an angle plus a number: cos(u + p) = cos p cos u - sin p sin u."""
     out: Terms = {}
     parts = [(kind, math.cos(phase))]
     if phase:
@@ -248,16 +249,17 @@ def shifted_wave(kind: int, angle: dict[int, float], phase: float, c: float) -> 
 
 
 def right_angles(constant: float) -> int:
-    """Right angles in a number, if it is a whole number of them."""
+    """Number of right angles in a constant, if it is a multiple of them."""
     n = round(constant / (math.pi / 2.0))
     return n if n and abs(constant - n * math.pi / 2.0) <= 4.0 * 2.0**-52 * abs(constant) else 0
 
 
-MAX_TERMS = 60  # of a sum that is multiplied out
-MANY_OPERATIONS = 2500  # operations from which on only short sums are
-UNREADABLE_COST = 3000.0  # symbols from which on nobody reads an expression: it stays as it is shared
-MAX_INNER_TERMS = 16  # terms up to which a part of an expression is gathered by itself
-SHORT_COST = 6.0  # what is as short as this is not looked at in another way
+MAX_TERMS = 60  # largest number of terms of an expanded sum
+MANY_OPERATIONS = 2500  # from so many operations on only short sums are expanded
+# Longer expressions are not simplified: they are too long to read.
+UNREADABLE_COST = 3000.0
+MAX_INNER_TERMS = 16  # largest number of terms of a part that is simplified by itself
+SHORT_COST = 6.0  # expressions up to this length are not simplified further
 
 
 def simplified(
@@ -271,9 +273,9 @@ def simplified(
     units : sequence of sequences of Node
         Symbols whose squares add up to one, such as the four of a unit quaternion.
     keep : sequence of Node
-        Expressions that stay as they are, as if they were symbols.
+        Expressions that are treated like symbols.
     most : int, optional
-        Terms up to which sums are multiplied out; fewer where expressions are large, if not given.
+        Largest number of terms of expanded sums; by default fewer where expressions are large.
 
     Returns
     -------
@@ -293,9 +295,9 @@ def simplified(
 
 
 class Barriers:
-    """Numbers of the nodes that are not looked into: those to keep, and operations on infinity or nan.
+    """Indices of nodes that are not expanded: those to keep, and operations on infinity or NaN.
 
-    These are values that no law of algebra holds for: infinity times a sum is not the sum of infinity times its terms.
+    The laws of algebra do not hold for these values: infinity times a sum is not the sum of infinity times its terms.
     """
 
     def __init__(self, graph: Graph, preserved: set[int]) -> None:
@@ -308,15 +310,15 @@ class Barriers:
 
 
 class Simplifier:
-    """Makes expressions of one graph short; what it has found serves the next.
+    """Simplifier of expressions of one graph, with a cache.
 
     Parameters
     ----------
     graph : Graph
     nodes : sequence of Node or number
-        Their number of operations decides how far sums are multiplied out.
+        Their number of operations determines how far sums are expanded.
     units, keep, most
-        As of `simplified`.
+        As for `simplified`.
     """
 
     def __init__(
@@ -330,8 +332,8 @@ class Simplifier:
         self.expander = Expander(self, most or (MAX_TERMS if size < MANY_OPERATIONS else FEW_TERMS))
         self.gathered = Factorizer(graph, self.costs)
         self._short: dict[Any, Node] = {}
-        self._best: dict[int, Node] = {}  # of parts
-        self._whole: dict[int, Node] = {}  # of what was asked for
+        self._best: dict[int, Node] = {}  # results for parts
+        self._whole: dict[int, Node] = {}  # results for whole expressions
 
     def __call__(self, x: Node) -> Node:
         """The shortest expression found."""
@@ -343,7 +345,7 @@ class Simplifier:
         return self._whole[x.index]
 
     def cost(self, x: Node) -> float:
-        """How long it is to read."""
+        """Length of an expression to read."""
         return reading_cost(x, self.costs)
 
     def _shortest(self, x: Node) -> Node:
@@ -361,20 +363,20 @@ class Simplifier:
         return found
 
     def _parts(self, x: Node) -> Node:
-        """The same operation on the best of its arguments."""
+        """The same operation on simplified arguments."""
         return self.graph.rebuilt(x, tuple(self._best[a.index] for a in x.args))
 
     def shorter(self, x: Node, other: Node) -> Node:
-        """The best that is known for ``x``, or the other of the same value."""
+        """The shorter of the best known form of ``x`` and another expression of the same value."""
         return min(other, self._best.get(x.index, other), key=self.cost)
 
     def inside(self, x: Node) -> Node:
-        """A function of short arguments."""
+        """A function of simplified arguments."""
         args = tuple(self._best[a.index] if a.index in self._best else self(a) for a in x.args)
         return x if x.op == CALL and args == x.args else self.graph.rebuilt(x, args)
 
     def short(self, terms: Terms) -> Node:
-        """A node for a sum of terms: with sums of angles, or products of waves, as is shorter."""
+        """Node for a sum of terms, with sums of angles or products of waves, whichever is shorter."""
         key = frozenset(terms.items())
         found = self._short.get(key)
         if found is None:
@@ -405,7 +407,7 @@ class Simplifier:
 
 
 def merge_equal_terms(terms: list[Term]) -> list[Term]:
-    """Equal terms as one."""
+    """Merge equal terms."""
     found: dict[Any, tuple[float, dict[int, int]]] = {}
     for c, p in terms:
         key = tuple(sorted(p.items()))

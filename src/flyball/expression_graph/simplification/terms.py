@@ -21,7 +21,7 @@ from typing import Any
 from ..graph import Graph, Node
 
 COS, SIN = 0, 1
-CONSTANT_ATOM = -1  # in the place of an atom: the plain number in an angle
+CONSTANT_ATOM = -1  # stands for the constant in an angle
 
 Powers = tuple[tuple[int, int], ...]
 Angle = tuple[tuple[int, float], ...]
@@ -31,11 +31,11 @@ Terms = dict[Key, float]
 
 CONSTANT_TERM: Key = ((), ())
 ROUNDING = 1e-14
-"""What is left of numbers that cancel, relative to them, is rounding."""
+"""Relative size below which a difference of numbers is rounding."""
 
 
 def add_term(out: Terms, key: Key, c: float) -> None:
-    """Add a term; one that cancels to rounding is gone."""
+    """Add a term; a term that cancels to rounding is removed."""
     old = out.get(key)
     if old is None:
         if c != 0.0:
@@ -83,7 +83,7 @@ def inverse_powers(a: Powers) -> Powers:
 
 
 def normalised_angle(angle: dict[int, float]) -> tuple[Angle, float]:
-    """An angle with its first factor positive, and whether it was turned round: 1 or -1."""
+    """An angle with its first factor positive, and the sign that was extracted: 1 or -1."""
     items = sorted((k, c) for k, c in angle.items() if c != 0.0)
     if items and items[1 if items[0][0] == CONSTANT_ATOM and len(items) > 1 else 0][1] < 0.0:
         return tuple((k, -c) for k, c in items), -1.0
@@ -91,7 +91,7 @@ def normalised_angle(angle: dict[int, float]) -> tuple[Angle, float]:
 
 
 def angle_combination(a: Angle, b: Angle, sign: float) -> dict[int, float]:
-    """A + b or a - b."""
+    """Sum a + b or difference a - b."""
     out = dict(a)
     for k, c in b:
         old = out.get(k, 0.0)
@@ -101,7 +101,7 @@ def angle_combination(a: Angle, b: Angle, sign: float) -> dict[int, float]:
 
 
 def wave(kind: int, angle: dict[int, float]) -> tuple[tuple[Wave, ...], float]:
-    """Cosine or sine of an angle, as waves and a factor; that of nothing is a number."""
+    """Cosine or sine of an angle, as waves and a factor; a number for angle zero."""
     found, sign = normalised_angle(angle)
     if not found:
         return (), 1.0 if kind == COS else 0.0
@@ -123,7 +123,7 @@ def wave_product(a: Wave, b: Wave) -> list[tuple[tuple[Wave, ...], float]]:
 
 
 def product_of_terms(a: Terms, b: Terms) -> Terms:
-    """Product, multiplied out; each term of the factors has at most one wave."""
+    """Expanded product; each term of the factors has at most one wave."""
     out: Terms = {}
     for (p, u), c in a.items():
         for (r, w), d in b.items():
@@ -137,7 +137,7 @@ def product_of_terms(a: Terms, b: Terms) -> Terms:
 
 
 def ratio_of_terms(a: Terms, b: Terms) -> tuple[Powers, float] | None:
-    """The powers and the number by which ``a`` is ``b`` times them, if it is."""
+    """Powers and number whose product with ``b`` is ``a``; None if there are none."""
     if len(a) != len(b) or not b:
         return None
     if len(b) == 1:
@@ -157,9 +157,9 @@ SQUARE = 2
 
 
 def without_squares(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
-    """Terms in which the first of every unit has no square: equal ones are then seen to be equal.
+    """Eliminate squares of the first component of every unit vector, so that equal expressions become equal terms.
 
-    Without this a product of rotations that is the identity stays a polynomial of the eighth degree.
+    Without this a product of rotations that is the identity remains a polynomial of the eighth degree.
     """
     for first, *others in units:
         high = [key for key in terms if any(k == first and n >= SQUARE for k, n in key[0])]
@@ -177,9 +177,9 @@ def without_squares(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
 
 
 def shortened_by_unit_norms(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
-    """Terms with multiples of x^2 + y^2 + ... - 1 added where fewer are left; ``units`` are indices of x, y, ..."""
+    """Add multiples of x^2 + y^2 + ... - 1 where that leaves fewer terms; ``units`` are indices of x, y, ..."""
     for unit in units:
-        for _ in range(4):  # of higher order once more
+        for _ in range(4):  # repeated for higher orders
             change = _unit_norm_change(terms, unit)
             if not change:
                 break
@@ -188,7 +188,7 @@ def shortened_by_unit_norms(terms: Terms, units: Sequence[tuple[int, ...]]) -> T
 
 
 def _unit_norm_change(terms: Terms, unit: tuple[int, ...]) -> Terms:
-    """What to add: for each product that a square of the unit's stands at, the multiple that leaves the fewest."""
+    """Terms to add: for each cofactor of a square of the unit vector, the multiple that leaves the fewest terms."""
     members: dict[Key, list[int]] = defaultdict(list)
     for powers, waves in terms:
         for k, n in powers:
@@ -228,7 +228,7 @@ def wave_node(graph: Graph, w: Wave) -> Node:
 
 
 def contracted_waves(terms: Terms) -> list[Product]:
-    """Terms with pairs taken together as long as there are any; the simplest results first."""
+    """Contract pairs of waves to products as long as possible; the simplest results first."""
     left = {n: (c, powers, waves) for n, ((powers, waves), c) in enumerate(sorted(terms.items()))}
     fresh = len(left)
     while True:
@@ -245,7 +245,7 @@ def contracted_waves(terms: Terms) -> list[Product]:
 
 
 def combined_phases(terms: Terms) -> Terms:
-    """Terms with a cos u + b sin u as one wave, c cos(u - p) or c sin(u - p), where p is a number that one knows."""
+    """Combine a cos u + b sin u to one wave c cos(u - p) or c sin(u - p), if p is an exact number."""
     out = dict(terms)
     for powers, waves in terms:
         sine = (powers, ((SIN, waves[0][1]),)) if waves and waves[0][0] == COS else None
@@ -263,14 +263,14 @@ def combined_phases(terms: Terms) -> Terms:
 
 
 def _exact_phase(phase: float) -> float | None:
-    """A part of pi or a short decimal that a phase is, but for rounding."""
+    """Fraction of pi or short decimal that equals a phase within rounding; None if there is none."""
     part = round(phase * 48.0 / math.pi) * math.pi / 48.0
     short = float(f"{phase:.5g}")
     return next((x for x in (part, short) if abs(x - phase) < ROUNDING), None)
 
 
 def double_angles(terms: Terms) -> list[Product]:
-    """Terms with 2 sin a cos a in place of sin 2a."""
+    """Replace sin 2a by 2 sin a cos a."""
     out: list[Product] = []
     for (powers, waves), c in sorted(terms.items()):
         half = _half_angle(dict(waves[0][1])) if waves and waves[0][0] == SIN else None
@@ -282,7 +282,7 @@ def double_angles(terms: Terms) -> list[Product]:
 
 
 def _pairs(remaining: dict[int, Product]) -> list[tuple[float, int, int, Product]]:
-    """Pairs that become one term, the simplest first."""
+    """Pairs of terms that contract to one term, the simplest first."""
     alike: dict[Any, list[tuple[int, Wave | None]]] = defaultdict(list)
     for n, (c, powers, waves) in remaining.items():
         number = f"{abs(c):.12e}"
@@ -310,7 +310,7 @@ def _waves_cost(waves: tuple[Wave, ...]) -> float:
 
 
 def _wave_pair_product(c: float, u: Wave | None, d: float, w: Wave | None) -> tuple[float, tuple[Wave, ...]] | None:
-    """C u + d w as one product, where |c| = |d| and the halves of the angles are whole."""
+    """c u + d w as one product, if |c| = |d| and the half angles have integer factors."""
     a, b = u or (COS, ()), w or (COS, ())
     if a[0] != b[0] or abs(abs(c) - abs(d)) > ROUNDING * abs(c):
         return None
@@ -318,7 +318,7 @@ def _wave_pair_product(c: float, u: Wave | None, d: float, w: Wave | None) -> tu
     if half[0] is None or half[1] is None:
         return None
     (p, turn_p), (m, turn_m) = half[0], half[1]
-    if u and w and _waves_cost(((COS, p), (COS, m))) > _waves_cost((u, w)):  # cos 2a + cos 2b stays
+    if u and w and _waves_cost(((COS, p), (COS, m))) > _waves_cost((u, w)):  # cos 2a + cos 2b is kept
         return None
     same = (c > 0.0) == (d > 0.0)
     if a[0] == COS:
@@ -330,7 +330,7 @@ def _wave_pair_product(c: float, u: Wave | None, d: float, w: Wave | None) -> tu
 
 
 def _half_angle(angle: dict[int, float]) -> tuple[Angle, float] | None:
-    """Half an angle, if what it is made of stays whole and is something."""
+    """Half of an angle, if its factors stay integers and it is not zero; else None."""
     if any(k != CONSTANT_ATOM and (0.5 * c) % 1.0 for k, c in angle.items()):
         return None
     found, sign = normalised_angle({k: 0.5 * c for k, c in angle.items()})

@@ -71,9 +71,7 @@ class ConvexPart:
 
 
 def surface_part(surface: tuple[np.ndarray, np.ndarray]) -> ConvexPart:
-    """Return the part of a closed surface, vertices (k, 3) and triangles (m, 3), before decomposition into convex
-    parts.
-    """
+    """The part of a closed surface, vertices (k, 3) and triangles (m, 3), before decomposition into convex parts."""
     v, f = np.real(surface[0]), np.asarray(surface[1], np.int64)
     return ConvexPart("MESH", (), np.sqrt((v**2).sum(axis=1)).max(), vertex=v, face=f.ravel())
 
@@ -193,8 +191,7 @@ def circle_outline(radius: Any, p: np.ndarray) -> ConvexPart:
 def revolved_outline(
     what: Any, p: np.ndarray, R: np.ndarray, radius: Any, profile: list[tuple[Any, Any]]
 ) -> ConvexPart:
-    """Return the outline of a solid of revolution: a circle along its axis, the points (r, z) and (-r, z) from the
-    side.
+    """The outline of a solid of revolution: a circle along its axis, the points (r, z) and (-r, z) from the side.
 
     Raises
     ------

@@ -27,7 +27,7 @@ def fraction_within(n, bound, r):
 
 @formula
 def rolling_cone_normal(mu, rho, sigma, n, r, q, w):
-    """Normal component of the projection on r' <= mu n', q' <= rho n', w' <= sigma n'; r, q, w >= 0.
+    """Return the normal component of the projection on r' <= mu n', q' <= rho n', w' <= sigma n'; r, q, w >= 0.
 
     It is the root of n' - n - sum m max(0, x - m n') over the three, a concave increasing function, so Newton's method
     from the left ends at it after at most one step per corner.

@@ -268,7 +268,7 @@ def term_size(P, x, i):
 
 @formula
 def row_rounding(P, x, i):
-    """Rounding error of row i."""
+    """Return the rounding error of row i."""
     return TERM_ROUNDING * term_size(P, x, i) + P.grain[i] / P.row[ROW_SCALE, i]
 
 

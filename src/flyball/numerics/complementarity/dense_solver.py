@@ -75,7 +75,7 @@ def solve_by_pivoting(P):
 
 @formula
 def number_unknowns(P):
-    """Number the unknowns, the first of each row in ``at``; returns their count."""
+    """Assign numbers to the unknowns, the first of each row in ``at``; returns their count."""
     n, m = P.b.shape[0], 0
     for i in range(n):
         P.at[i] = m

@@ -300,7 +300,7 @@ def visit_velocity(P, X, W, s, at, ball, new):
 
 @formula
 def difference_product(a, b, c):
-    """(a - b) . c for vectors."""
+    """Return (a - b) . c for vectors."""
     return (a[0] - b[0]) * c[0] + (a[1] - b[1]) * c[1] + (a[2] - b[2]) * c[2]
 
 

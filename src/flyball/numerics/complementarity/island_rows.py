@@ -88,7 +88,7 @@ def link_group_side(P, head, chain, g, t, rows):
 
 @formula
 def number_blocks(P, span, head, chain):
-    """Number the blocks; returns their count. The number of blocks of a group is in head[nn + ng + g]."""
+    """Assign numbers to the blocks; returns their count. Blocks per group are in head[nn + ng + g]."""
     first, last, line, end = span
     for c in range(first, last):
         reset_contact_sides(P, c, head)
@@ -118,7 +118,7 @@ def number_blocks(P, span, head, chain):
 
 @formula
 def number_group(P, head, g, blocks):
-    """Number the blocks of a group, once; returns the new count of blocks."""
+    """Assign numbers to the blocks of a group, once; returns the new count of blocks."""
     nn, ng = P.size[1], P.size[2]
     if head[nn + g] < 0:
         rank = min(P.group[g + 1] - P.group[g], head[nn + ng + g])
@@ -155,7 +155,7 @@ def row_subject(span, row):
 
 @formula
 def row_count(P, span):
-    """Number of rows."""
+    """Return the number of rows."""
     contacts = span[1] - span[0]
     return contacts + span[3] - span[2] + (contacts if P.turn.shape[0] > 0 else 0)
 
@@ -570,7 +570,7 @@ def island_rows(P, F, size):
 
 @formula
 def places_needed(P, size):
-    """Required length of `FactorStorage.places`."""
+    """Return the required length of `FactorStorage.places`."""
     m, nb = size[ROWS], size[BLOCKS]
     fixed = SIZE_COUNT + P.size[1] + 3 * P.size[2] + 6 * m + 2
     return fixed + size[ENTRIES] + size[PAIRS] + 7 * (nb + 1) + size[POOL] + size[FILL]
@@ -578,7 +578,7 @@ def places_needed(P, size):
 
 @formula
 def numbers_needed(size):
-    """Required length of `FactorStorage.numbers`."""
+    """Return the required length of `FactorStorage.numbers`."""
     return 18 * size[ENTRIES] + ROW_WIDTH * size[ROWS] + 60 * size[BLOCKS] + 72 * size[FILL]
 
 

@@ -38,14 +38,14 @@ def side_vertex(at, nodes):
 
 @formula
 def contact_vertex(at, c, nodes):
-    """A vertex on which contact c acts, -1 if there is none."""
+    """Return a vertex on which contact c acts, -1 if there is none."""
     a = side_vertex(at[c, 0], nodes)
     return a if a >= 0 else side_vertex(at[c, 1], nodes)
 
 
 @formula
 def number_islands(at, line_at, sizes, I):
-    """Number the islands in ``parent`` (entry of each root: -2 - island); returns their count."""
+    """Assign numbers to the islands in ``parent`` (entry of each root: -2 - island); returns their count."""
     nc, nn, ng, nl = sizes
     for i in range(nn + ng):
         I.parent[i] = i

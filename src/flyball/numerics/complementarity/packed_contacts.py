@@ -112,7 +112,7 @@ def contact_kind(P, W, c, friction_level):
 
 @formula
 def packed_width(kind):
-    """Number of packed numbers of a contact of this kind."""
+    """Return the number of packed numbers of a contact of this kind."""
     if kind == SMOOTH_SPHERE or kind == SPHERE:
         return SPHERE_WIDTH
     return FRICTIONLESS_WIDTH if kind == FRICTIONLESS else 32
@@ -359,7 +359,7 @@ def update_smooth_sphere(k, v, i, j, at):
 
 @formula
 def frictionless_velocity(k, v, i, j, at):
-    """Normal velocity of a frictionless contact, without bias."""
+    """Return the normal velocity of a frictionless contact, without bias."""
     u = k[at] * (v[j, 0] - v[i, 0]) + k[at + 1] * (v[j, 1] - v[i, 1]) + k[at + 2] * (v[j, 2] - v[i, 2])
     u += k[at + UNIT_TORQUE2] * v[j, 3] + k[at + UNIT_TORQUE2 + 1] * v[j, 4] + k[at + UNIT_TORQUE2 + 2] * v[j, 5]
     return u - (
@@ -467,7 +467,7 @@ def apply_point_impulse(k, v, B, i, at, x, y, z):
 
 @formula
 def local_impulse(k, at, u, coulomb):
-    """New impulse of a frictional contact at velocities u without bias; the old impulse is still in k."""
+    """Return the new impulse of a frictional contact at velocities u without bias; the old impulse is still in k."""
     p, s, t = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]
     n = p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN]
     us, ut = u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]

@@ -54,7 +54,7 @@ CONTACT, LINE, IDLE, COULOMB_CONTACT, ROLLING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 @formula
 def cone_derivative(mu, least, n, s, t):
-    """Derivative of `project_on_cone_above`: nn, ns, nt, ss, st, tt, and sn, tn, here equal to ns and nt."""
+    """Return the derivative of `project_on_cone_above`: nn, ns, nt, ss, st, tt, and sn, tn, here equal to ns and nt."""
     r = sqrt(s * s + t * t)
     if r <= mu * n and n >= least:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0
@@ -68,7 +68,7 @@ def cone_derivative(mu, least, n, s, t):
 
 @formula
 def disc_derivative(normal, bound, s, t, r):
-    """Derivative of the tangential part cut at a bound; ``normal``: derivative of the bound by the normal part."""
+    """Return the derivative of the tangential part cut at a bound; ``normal``: that of the bound by the normal part."""
     one = 1.0 if normal > 0.0 else 0.0
     if r <= bound:
         b = 1.0 if bound > 0.0 else 0.0
@@ -88,7 +88,7 @@ def project_by_coulomb(mu, least, n, s, t):
 
 @formula
 def coulomb_derivative(mu, least, n, s, t):
-    """Derivative of `project_by_coulomb`, as `cone_derivative`; not symmetric while sliding."""
+    """Return the derivative of `project_by_coulomb`, as `cone_derivative`; not symmetric while sliding."""
     r = sqrt(s * s + t * t)
     if n > least:
         p = disc_derivative(mu, mu * n, s, t, r)
@@ -113,7 +113,7 @@ def nearest_impulse(x, o, n, s, t):
 
 @formula
 def nearest_impulse_derivative(x, o, n, s, t):
-    """Derivative of `nearest_impulse`."""
+    """Return the derivative of `nearest_impulse`."""
     if x[o + KIND] == CONTACT:
         return cone_derivative(x[o + SCALED_MU], x[o + LOWEST], n, s, t)
     if x[o + KIND] == COULOMB_CONTACT:
@@ -295,7 +295,7 @@ def set_target_changes(R):
 
 @formula
 def slope_along_step(R, a, first, second):
-    """Derivative of the objective along the step at its part a; ``first``, ``second``: e . step, |step|^2."""
+    """Return the derivative of the objective along the step at part a; ``first``, ``second``: e . step, |step|^2."""
     x = R.row
     total = first + a * second
     for row in range(R.size[ROWS]):

@@ -8,7 +8,7 @@ as callbacks.
 
 Imports: NumPy, `compiler/`, `math/`, `errors`, `integrators/time_loop`.
 
-A step is searched in subintervals of eight nodes and two that check them, halved where they are not resolved; an event
-is then located by the equations, and the step taken again to end on it, which is as exact as the integration. A guard
-has a rounding floor and leaves its side only beyond it, so nothing triggers twice.
+A step is searched in subintervals with eight nodes and two check places, which are halved if they are not resolved. An
+event is then located with the equations, and the step is repeated to end on it; the event time is as accurate as the
+integration. A guard changes its side only beyond its rounding floor, so no event triggers twice.
 """

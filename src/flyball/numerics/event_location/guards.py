@@ -367,7 +367,7 @@ def crossing_floor(W, i, x):
 
 @formula
 def rounding_floor(W, i, x):
-    """Rounding error of guard i at a fraction x of the step."""
+    """Return the rounding error of guard i at a fraction x of the step."""
     if W.kept[i] == 1 or is_law_corner(W, i):
         return ROUNDING_FACTOR * W.grain[i]
     return W.real.drift * ((1.0 - x) * W.g[START_ROUNDING, i] + x * W.g[END_ROUNDING, i])
@@ -375,7 +375,7 @@ def rounding_floor(W, i, x):
 
 @formula
 def rounding_floor_with_time(W, c, i, slope, x):
-    """Rounding error of a guard at a fraction x of the step, including that of time for a guard of this slope."""
+    """Return the rounding error of a guard of this slope at a fraction x of the step, including that of time."""
     return rounding_floor(W, i, x) + TIME_RESOLUTION * max(abs(c.real.t), c.real.largest) * abs(slope)
 
 

@@ -193,7 +193,7 @@ def may_cross(W, i):
 
 @formula
 def subinterval_floor(W, i):
-    """Rounding floor of guard i, the smaller one of both ends of the subinterval."""
+    """Return the rounding floor of guard i, the smaller one of both ends of the subinterval."""
     return min(rounding_floor(W, i, W.real.subinterval), rounding_floor(W, i, W.real.subinterval + W.real.width))
 
 

@@ -8,9 +8,9 @@ Explicit methods are data: a new one is an entry of `butcher_tableaux.TABLEAUX` 
 new implicit method is a module with functions to attempt, interpolate, accept and reject a step. The functions that
 a method evaluates are passed as callbacks. Imports: NumPy, `compiler/`, `math/`, `numerics/`.
 
-The dense output of ``dop853`` misses by 20 to 1000 tolerances where stability limits steps, so its own error is judged
-whenever something is read within a step. Where a second step in a row is rejected, it is repeated from a state 1e-14
-away: an error that differs is rounding, and shorter steps do not help.
+The dense output of ``dop853`` is wrong by 20 to 1000 tolerances where stability limits steps, so its own error is
+checked whenever a step is interpolated. If two steps in a row are rejected, the step is repeated from a state that
+differs by 1e-14: if the error changes, it is rounding, and shorter steps do not help.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ from .time_loop import (
 )
 
 FREE_MOMENTA, ARRIVAL_MOMENTA, START_MOMENTA, END_MOMENTA = range(4)  # rows of p
-AT_STEP_START, AT_STEP_END, TRIAL_FORCES = range(3)  # rows of f, and of rows
+AT_STEP_START, AT_STEP_END, TRIAL_FORCES = range(3)  # rows of f; of rows: the first two
 MAX_ITERATIONS = 30  # of each iteration
 CONVERGED_CHANGE = 4e-15  # change of forces, relative to the momenta, below which the iteration has converged
 ROUNDING_CHANGE = 1e-9  # the same, below which a change that stops decreasing is rounding

@@ -38,17 +38,17 @@ VIEWS: tuple[tuple[type, type[PartView]], ...] = (
 
 
 def has_view(element: Any) -> bool:
-    """Whether a result says something of a part."""
+    """Return whether results contain quantities of a part."""
     return isinstance(element, tuple(kind for kind, _ in VIEWS))
 
 
 def view_of(result: Result, element: Any) -> PartView:
-    """The view of a part.
+    """Return the view of a part.
 
     Raises
     ------
     ModelError
-        If a result says nothing of parts of its kind.
+        If results contain no quantities of parts of its kind.
     """
     for kind, cls in VIEWS:
         if isinstance(element, kind):

@@ -1,4 +1,4 @@
-"""Base classes of views: quantities by name as attributes and curves; views of consecutive parts spliced."""
+"""Base classes of views: quantities by name as attributes and curves; concatenated views of consecutive parts."""
 
 from __future__ import annotations
 
@@ -30,30 +30,30 @@ def continuous_quaternions(e: np.ndarray) -> np.ndarray:
 
 
 class NamedQuantities:
-    """Something that has quantities over time, by the names of `flyball.model.quantities`.
+    """Base class of objects with quantities over time, by the names of `flyball.model.quantities`.
 
-    Each of them is an attribute and an answer of `quantity`; what the class has no property for, ``_found`` knows.
+    Each of them is an attribute, and a result of `quantity`; those without a property are provided by ``_found``.
     """
 
-    instead: ClassVar[dict[str, str]] = {}  # a name that it has not -> what to ask for
+    instead: ClassVar[dict[str, str]] = {}  # unknown name -> the name to use instead
 
     @property
     def title(self) -> str:
-        """What it is, for messages."""
+        """Title for messages."""
         raise NotImplementedError
 
     @property
     def names(self) -> dict[str, Quantity]:
-        """Everything that it has, by name."""
+        """All its quantities by name."""
         raise NotImplementedError
 
     def quantity(self, name: str) -> tuple[str, np.ndarray]:
-        """Unit and values over time, (n,) or (n, k), of one of its names.
+        """Return unit and values over time, (n,) or (n, k), of a quantity.
 
         Raises
         ------
         ModelError
-            If it has none of that name; the message lists what there is.
+            If there is none of that name; the message lists the existing ones.
         """
         x = self.names.get(name)
         if x is None:
@@ -63,7 +63,7 @@ class NamedQuantities:
         return x.unit, values if x.component is None else values[:, x.component]
 
     def _found(self, name: str) -> Any:
-        """Values of what the class has no property for."""
+        """Return the values of a quantity without a property."""
         raise AttributeError(name)
 
     def _unknown(self, name: str) -> str:
@@ -71,12 +71,12 @@ class NamedQuantities:
         return f"{unknown_quantity(self.title, name, self.names)}{more}"
 
     def channels(self) -> Curves:
-        """Its curves: name -> (unit, values)."""
+        """Return its curves: name -> (unit, values)."""
         return {k: self.quantity(k) for k, x in self.names.items() if x.curve}
 
     def __getattr__(self, name: str) -> Any:
-        """Any of its quantities by name."""
-        if name.startswith("_") or name in ("element", "names"):  # asked for while it is being unpickled
+        """Return any of its quantities by name."""
+        if name.startswith("_") or name in ("element", "names"):  # accessed during unpickling
             raise AttributeError(name)
         if name not in self.names:
             raise AttributeError(self._unknown(name))
@@ -89,7 +89,7 @@ class NamedQuantities:
         return list(self.names)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One of its quantities by name."""
+        """Return one of its quantities by name."""
         return self.quantity(name)[1]
 
 
@@ -108,7 +108,7 @@ class PartView(NamedQuantities):
 
     @cached_property
     def names(self) -> dict[str, Quantity]:
-        """Everything that the result says of the part, by name."""
+        """All quantities of the part, by name."""
         return quantities(self._x.structure.model, self.element.name)
 
     def __repr__(self) -> str:
@@ -116,7 +116,7 @@ class PartView(NamedQuantities):
 
 
 class SplicedView(NamedQuantities):
-    """The views of one part over times that follow one another, each with parameters of its own."""
+    """Concatenated views of one part over consecutive times, each with its own parameters."""
 
     def __init__(self, views: Sequence[Any], counts: Sequence[int]) -> None:
         self._views, self._counts = tuple(views), tuple(counts)
@@ -128,7 +128,7 @@ class SplicedView(NamedQuantities):
 
     @cached_property
     def names(self) -> dict[str, Quantity]:
-        """Everything that the result says of the part."""
+        """All quantities of the part."""
         return self._views[0].names
 
     def quantity(self, name: str) -> tuple[str, np.ndarray]:
@@ -142,13 +142,13 @@ class SplicedView(NamedQuantities):
         return continuous_quaternions(values) if name == "quaternion" else values
 
     def channels(self) -> Curves:
-        """Curves that any piece has."""
+        """Return the curves of all pieces."""
         names = dict.fromkeys(k for v in self._views for k in v.channels())
         return {k: self.quantity(k) for k in names}
 
     def __getattr__(self, name: str) -> Any:
-        """Anything that the views have; methods answer with what those of all pieces do."""
-        if name.startswith("_"):  # asked for while it is being unpickled
+        """Return any attribute of the views; results of methods are concatenated over all pieces."""
+        if name.startswith("_"):  # accessed during unpickling
             raise AttributeError(name)
         if name in self.names:
             return self.quantity(name)[1]

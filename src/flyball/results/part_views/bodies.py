@@ -31,7 +31,7 @@ class FrameView(PartView):
 
     @cached_property
     def _moving(self) -> KinematicRecord:
-        """Its record without accelerations."""
+        """Return its record without accelerations."""
         return self._result.motions.carried(*self._placed)
 
     @cached_property
@@ -54,7 +54,7 @@ class FrameView(PartView):
         return components_array(self._record[5], self._result.planar)
 
     def _found(self, name: str) -> np.ndarray:
-        """Of a body: what holds a coordinate that events lock, or the sum of contact forces on it [N], world axes."""
+        """Return the effort of a locked coordinate, or the sum of contact forces on a body [N], world axes."""
         if name.endswith("_effort"):
             return self._effort(f"{self.element.name}.{name.removesuffix('_effort')}")
         found, n = self._result.contacts, 2 if self._result.planar else 3
@@ -63,19 +63,19 @@ class FrameView(PartView):
         return found.force_on(*found.sides.span(self.element.name))[:, 0, :n]
 
     def _effort(self, coordinate: str) -> np.ndarray:
-        """Force [N] or torque [N m] along a coordinate while it is locked, else 0: where no events happen, too."""
+        """Return the force [N] or torque [N m] along a coordinate while it is locked, else 0."""
         rows = [w.row for w in self._result.values.structure.switches if w.switch.label == coordinate]
         return self._result.multipliers[:, rows[0]] if rows else self._result.motions.zeros()
 
     @property
     def rotation(self) -> np.ndarray:
         """Rotation matrices, world from frame, (n, 3, 3)."""
-        R = [x + self._result.motions.zeros() for x in self._moving[1]]  # in the plane some are plain numbers
+        R = [x + self._result.motions.zeros() for x in self._moving[1]]  # in the plane some are scalars
         return np.stack(R, axis=1).reshape(-1, 3, 3)
 
     @property
     def quaternion(self) -> np.ndarray:
-        """Unit quaternions, scalar first, (n, 4): of the sign of the one before; in the plane of half the angle."""
+        """Unit quaternions, scalar first, (n, 4), continuous in sign; in the plane by half the angle."""
         if self._result.planar:
             half, zero = 0.5 * self.angle, self._result.motions.zeros()
             return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
@@ -83,7 +83,7 @@ class FrameView(PartView):
 
     @property
     def angle(self) -> np.ndarray:
-        """Planar: orientation [rad], whole turns counted."""
+        """Planar: orientation [rad], with full turns."""
         if not self._result.planar:
             raise AttributeError(self._unknown("angle"))
         return self._result.motions.angle(self._body) + atan2(self._turn[3], self._turn[0])
@@ -108,12 +108,12 @@ class BodySetView(NamedQuantities):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Title for messages."""
         return f"set of bodies {self._bulk.name!r}"
 
     @cached_property
     def names(self) -> dict[str, Quantity]:
-        """Everything that the result says of it, by name."""
+        """All its quantities, by name."""
         return quantities(self._result.model, self._bulk.name)
 
     def __len__(self) -> int:
@@ -136,7 +136,7 @@ class BodySetView(NamedQuantities):
 
     @property
     def angle(self) -> np.ndarray:
-        """Planar: orientations [rad], (n, m), whole turns counted from the start as far as outputs tell."""
+        """Planar: orientations [rad], (n, m), full turns counted from the start as far as output times resolve them."""
         if not self._result.planar:
             raise AttributeError(self._unknown("angle"))
         half = np.arctan2(self._bulk.quaternion[:, :, 3], self._bulk.quaternion[:, :, 0])
@@ -169,12 +169,12 @@ class SetMemberView(BodySetView):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Title for messages."""
         return f"body '{self._bulk.name}[{self._k}]'"
 
     @cached_property
     def names(self) -> dict[str, Quantity]:
-        """Everything that the result says of it, by name."""
+        """All its quantities, by name."""
         return quantities(self._result.model, f"{self._bulk.name}[{self._k}]")
 
     def __len__(self) -> int:
@@ -192,7 +192,7 @@ class SetMemberView(BodySetView):
 
     @property
     def quaternion(self) -> np.ndarray:
-        """Unit quaternions, scalar first, world from body, (n, 4); neighbours have the same sign."""
+        """Unit quaternions, scalar first, world from body, (n, 4), continuous in sign."""
         return continuous_quaternions(self._bulk.quaternion[:, self._k])
 
     @property
@@ -202,7 +202,7 @@ class SetMemberView(BodySetView):
 
     @property
     def angle(self) -> np.ndarray:
-        """Planar: orientation [rad], (n,), whole turns counted from the start as far as outputs tell."""
+        """Planar: orientation [rad], (n,), full turns counted from the start as far as output times resolve them."""
         return super().angle[:, self._k]
 
     @property

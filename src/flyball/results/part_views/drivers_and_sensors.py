@@ -14,7 +14,7 @@ from .base import PartView
 
 
 class DriverView(PartView):
-    """What a driver has to do."""
+    """Effort and work of a driver."""
 
     @property
     def effort(self) -> np.ndarray:
@@ -23,15 +23,15 @@ class DriverView(PartView):
 
     @property
     def work(self) -> np.ndarray:
-        """Work given to the mechanism since the start [J]."""
+        """Work done on the mechanism since the start [J]."""
         return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.work"]]
 
 
 class CouplingView(PartView):
-    """What a coupling passes on."""
+    """Efforts of a coupling."""
 
     def effort(self, coordinate: str) -> np.ndarray:
-        """Force [N] or torque [N m] that it puts on one of its coordinates, along it."""
+        """Return the force [N] or torque [N m] of the coupling on one of its coordinates, along it."""
         s, S = self._x.structure, self._x.system
         for k in s.terms_of[self.element.name]:
             t = s.terms[k]
@@ -41,7 +41,7 @@ class CouplingView(PartView):
         raise ModelError(f"{self.element.title} does not couple {coordinate!r}; it couples {has}")
 
     def _found(self, name: str) -> np.ndarray:
-        """``effort_1``, ``effort_2`` ... on its coordinates, in order."""
+        """Return ``effort_1``, ``effort_2`` ... on its coordinates, in order."""
         return self.effort(list(self.element.coupled())[int(name.removeprefix("effort_")) - 1])
 
 
@@ -49,7 +49,7 @@ class ControllerView(PartView):
     """States and signals of a controller over time."""
 
     def _found(self, name: str) -> np.ndarray:
-        """A state, or a signal from the formula that laws have in its place."""
+        """Return a state, or a signal from the formula that replaces it in laws."""
         s = self._x.structure
         state = s.state_at.get(f"{self.element.name}.{name}")
         if state is not None:
@@ -62,28 +62,28 @@ class ControllerView(PartView):
 
 
 class SensorView(PartView):
-    """A measured quantity under a name of its own."""
+    """A measured quantity with its own name."""
 
     @property
     def value(self) -> np.ndarray:
-        """What it measures, over time, in SI units."""
+        """Measured values over time, in SI units."""
         return self._result.channel(self.element.of)[1]
 
     @property
     def unit(self) -> str:
-        """Unit of what it measures."""
+        """Unit of the measured quantity."""
         return self.names["value"].unit
 
 
 class IMUView(PartView):
-    """What accelerometers and gyroscopes on a body show."""
+    """Readings of accelerometers and gyroscopes on a body."""
 
     def _axes(self) -> tuple:
         return self._result.records.named(self.element.frame)
 
     @property
     def specific_force(self) -> np.ndarray:
-        """Acceleration of its origin less gravity, along its own axes [m/s^2], (n, 3)."""
+        """Acceleration of its origin minus gravity, along its own axes [m/s^2], (n, 3)."""
         _, R, _, _, _, a = self._axes()
         gravity = tuple(self._x.system.gravity)
         return np.stack(mtv(R, sub(a, gravity)), axis=1)

@@ -1,4 +1,4 @@
-"""Quantities that force elements and contact places measure, and the forces they exert."""
+"""Quantities measured by force elements and contact points, and the forces they exert."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .base import Curves, PartView
 
 
 class ForceView(PartView):
-    """What a force element measures and does."""
+    """Measured quantities and forces of a force element."""
 
     def _index(self) -> int:
         return next(i for i, f in enumerate(self._x.structure.forces) if f is self.element)
@@ -46,7 +46,7 @@ class ForceView(PartView):
         return F, M, force_row(S.force_parameters, k)
 
     def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
-        """Of a force between frames: bodies of F and M, point, force and torque there on M's body over time."""
+        """For a force between frames, return: bodies of F and M; point, force and torque on M's body over time."""
         S = self._x.system
         _, force, torque = self._between()
         k = self._index()
@@ -54,7 +54,7 @@ class ForceView(PartView):
         return (i, j), self._frames[1][0], force, torque
 
     def pushes(self) -> tuple[int, np.ndarray]:
-        """Of a force along a measured quantity: number of that, and its effort along it over time; without its row."""
+        """For a force along a measured quantity, return: index of that, and its effort over time; without its row."""
         return int(self._x.system.forces.F[self._index()]), self._along()[2]
 
     def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -72,7 +72,7 @@ class ForceView(PartView):
         return x, rate, e.effort(force_row(S.force_parameters, k), x, rate, laws, load) + 0.0 * x
 
     def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
-        """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
+        """Return the sliding direction: as recorded by its switch; without a switch the sign of the rate."""
         s = int(self._x.system.forces.switch[k])
         stretches = self._result.phases
         if s < 0 or stretches is None:
@@ -81,13 +81,13 @@ class ForceView(PartView):
         return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
 
     def _rows(self) -> list[int]:
-        """Its switches, by number."""
+        """Return the indices of its switches."""
         return [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element and x.row >= 0]
 
     def _whole_along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """(value, rate, effort, side that is closed): with what its rows carry while they hold.
+        """Return (value, rate, effort, closed side), including the forces of active rows.
 
-        What is rigid and has no row, since the motion was not computed with any, has efforts that nothing tells: nan.
+        The effort of a rigid element without a row, because the motion was computed without it, is unknown: nan.
         """
         s, own = self._x.structure, self._rows()
         if any(f is self.element for f in s.forces):
@@ -112,7 +112,7 @@ class ForceView(PartView):
         return x, rate, effort, side
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Values of a law over time."""
+        """Return the values of a law over time."""
         if at < 0:
             return self._result.motions.zeros()
         s, S, t = self._x.structure, self._x.system, self._result.t
@@ -141,7 +141,7 @@ class ForceView(PartView):
         Raises
         ------
         AttributeError
-            For forces along coordinates in general, which may act on several bodies.
+            For forces along coordinates, which may act on several bodies.
         """
         n = len(self._result.t)
         if isinstance(self.element, JointForce):
@@ -184,14 +184,14 @@ class ForceView(PartView):
         return e.energy(par, F, M)
 
     def _in_force(self) -> Any:
-        """Whether it is there: 0 from where an event has released it."""
+        """Return whether it is active: 0 after an event has released it."""
         stretches = self._result.phases
         own = [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element]
         return 1.0 if stretches is None or not own else RecordedModes(*stretches.over("switch")).released[own[0]] == 0.0
 
     @property
     def power(self) -> np.ndarray:
-        """Power that it gives to the bodies [W]."""
+        """Power supplied to the bodies [W]."""
         if isinstance(self.element, CoordinateForce):
             _, rate, effort, _ = self._whole_along()
             return rate * effort
@@ -201,7 +201,7 @@ class ForceView(PartView):
 
     @property
     def work(self) -> np.ndarray:
-        """Work given to the bodies since the start [J]: integrated with the motion, or what it stores no more."""
+        """Work done on the bodies since the start [J]: integrated with the motion, or the decrease of stored energy."""
         name = f"{self.element.name}.work"
         states = self._x.structure.state_at
         if name in states:
@@ -210,14 +210,14 @@ class ForceView(PartView):
 
     @property
     def _whole(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force and torque of a force between frames: (n, 2) and (n,) in the plane."""
+        """Return force and torque of a force between frames: (n, 2) and (n,) in the plane."""
         force, torque = self.wrench
         return (force[:, :2], torque[:, 2]) if self._result.planar else (force, torque)
 
     def _found(self, name: str) -> np.ndarray:
         """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint.
 
-        Of a force on a body, or between two frames, force and torque there.
+        For a force on a body, or between two frames: force and torque.
         """
         outputs = list(self.element.outputs)
         if name not in outputs:
@@ -237,20 +237,20 @@ class ForceView(PartView):
         return unless_zero(inputs[0], along, norm(force))  # a damper between coinciding points: c times its rate
 
     def channels(self) -> Curves:
-        """Its outputs; for others, the components of force and torque that are not zero all the time."""
+        """Return its outputs; for other elements, the components of force and torque that are not zero all the time."""
         out = super().channels()
         return out if self.element.outputs else {k: v for k, v in out.items() if v[1].any()}
 
 
 class ContactPlaceView(PartView):
-    """A place of contact; nan where a motion was computed without."""
+    """A contact point; nan if the motion was computed without it."""
 
     @cached_property
     def _touched(self) -> ContactHistory:
         return ContactHistory(self._result, self.element)
 
     def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
-        """Bodies of F and M, a point, force and torque there on M's body over time: of friction that slides."""
+        """Return bodies of F and M; point, force and torque on M's body over time: of sliding friction."""
         x = self._touched
         S, t = self._x.system, self._x.structure.terms
         one = next(k for k in t if k.element is self.element)
@@ -270,17 +270,17 @@ class ContactPlaceView(PartView):
 
     @property
     def energy(self) -> np.ndarray:
-        """It stores none [J]."""
+        """Stored energy [J]: zero."""
         return self._result.records.zeros()
 
     @property
     def power(self) -> np.ndarray:
-        """Of friction [W]."""
+        """Power of friction [W]."""
         return self._touched.power if self._touched.known else self._result.records.zeros() * np.nan
 
     @property
     def work(self) -> np.ndarray:
-        """Of friction since the start [J], integrated with the motion."""
+        """Work of friction since the start [J], integrated with the motion."""
         at = self._x.structure.state_at.get(f"{self.element.name}.work")
         return self._result.records.zeros() if at is None else self._result.states[:, at]
 

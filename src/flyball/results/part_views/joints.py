@@ -29,7 +29,7 @@ class JointView(PartView):
         self._known: dict[tuple[str, bool], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def _measure(self, what: str, solved: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A coordinate, its rate and, where that is ``solved`` for, its acceleration, through the row that measures."""
+        """Return a coordinate, its rate and, if ``solved``, its acceleration, by the row that measures it."""
         r, x = self._result.records if solved else self._result.motions, self._x
         (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
         F, M = turned_record(r.frame(i), turn_i), turned_record(r.frame(j), turn_j)
@@ -43,7 +43,7 @@ class JointView(PartView):
         return c.sign * value + offset, c.sign * rate, c.sign * second
 
     def _turns(self, what: str, i: int, j: int) -> Any:
-        """Something close to the measured angle that knows its whole turns."""
+        """Return an approximation of the measured angle that includes full turns."""
         s, S = self._x.structure, self._x.system
         row = coordinate_row(s, self.element.name, what)
         if row is not None:
@@ -62,12 +62,12 @@ class JointView(PartView):
         return there - here - FULL_TURN * rounded((drawn_there - drawn_here) / FULL_TURN)
 
     def _heading(self, frame: int) -> Any:
-        """In the plane: the way that a frame's x axis points in its body."""
+        """In the plane: return the angle of a frame's x axis in its body."""
         R = self._x.system.frames.rotation[frame]
         return atan2(*R[[3, 0]].tolist())
 
     def _found(self, name: str) -> np.ndarray:
-        """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
+        """Return a coordinate by name, or its derivatives with ``_rate`` and ``_acceleration`` appended."""
         if name == "place":
             return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
         k = next((k for k, ending in enumerate(DERIVATIVE_ENDINGS) if k and name.endswith(ending)), 0)
@@ -77,7 +77,7 @@ class JointView(PartView):
         return self._known[key][k]
 
     def _wrench(self) -> Wrench:
-        """Force on body_j at M's origin and torque about it, world components."""
+        """Return the force on body_j at M's origin and the torque about it, world components."""
         return self._result.reactions.of(self.element.name)
 
     def reaction(self, *, axes: str = "world", on: str | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +88,7 @@ class JointView(PartView):
         axes : ``"world"``, ``"joint"`` or the name of one of the two bodies
             Axes of the components; ``"joint"`` are those of the joint's frame on ``body_i``.
         on : str
-            Name of the body it acts on; ``body_j`` if not given.
+            Body on which it acts; ``body_j`` if not given.
 
         Returns
         -------
@@ -108,7 +108,7 @@ class JointView(PartView):
         return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
 
     def rotation(self, axes: str) -> np.ndarray:
-        """Rotation matrices, world from the axes that `reaction` knows by this name, (n, 3, 3)."""
+        """Return rotation matrices, world from the axes named as in `reaction`, (n, 3, 3)."""
         e = self.element
         names = [self._x.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
         full = [np.broadcast_to(x, len(self._result.t)) for x in self._axes(axes, names)]
@@ -131,11 +131,11 @@ class JointView(PartView):
 
     @property
     def torque(self) -> np.ndarray:
-        """Reaction torque on ``body_j`` about the joint's point, world axes [N m]; planar: one number a time."""
+        """Reaction torque on ``body_j`` about the joint's point, world axes [N m]; planar: (n,)."""
         t = self._wrench()[1]
         return t[2] if self._result.planar else np.stack(t, axis=1)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Reaction components that redundancy leaves undetermined; of those one choice is given."""
+        """Reaction components that redundancy leaves undetermined; results contain one of the possible values."""
         return self._result.health.undetermined.get(self.element.name, ())

@@ -33,7 +33,7 @@ class EventContext:
     """The state of a motion at an instant.
 
     Modes are in ``c.work.modes``. The states of switches (side, direction of sliding) follow the measured quantities in
-    ``c.work.sensed`` (see `engine.guards`).
+    ``c.work.sensed`` (see `engine.rows.direction_column`).
 
     Attributes
     ----------
@@ -214,8 +214,7 @@ def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
     distance.
 
     A closed stop whose quantity is no longer at its bound but on its free side is opened. Quantities at the state are
-    in
-    the workspace.
+    in the workspace.
     """
     S, W, out = here.c.system, here.c.work, dict[int, float]()
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]

@@ -189,8 +189,7 @@ def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
     """Restore the signs of event expressions where a motion continues.
 
     An event at the very end of the earlier motion has just happened. Any other is still ahead, however near: it keeps
-    the
-    sign that it had before its value was rounding. A value that is clearly nonzero now gives the sign itself.
+    the sign that it had before its value was rounding. A value that is clearly nonzero now gives the sign itself.
     """
     desk, told = loop.desk, events_at_start(here)
     values = instant_problem(here).guards()
@@ -209,8 +208,7 @@ def missed_crossings(here: EventContext, loop: GuardedLoop) -> frozenset[int]:
     """Return switches whose crossing was not detected: stops crept past, corners on the other side.
 
     Such a stop hardly moved at the start of the step; one that moved closes with an impact. The side of a law is
-    decided
-    in `nonsmooth_laws`.
+    decided in `nonsmooth_laws`.
     """
     S, out = here.c.system, set()
     for g in loop.fired if loop.desk.count.leaves_kept_side else ():
@@ -347,9 +345,7 @@ class EventDrivenMotion:
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.end = float(
-            clock.real.t_end
-        )  # of the motion; that in the integrator state is the end of the present interval
+        self.end = float(clock.real.t_end)  # of the motion; that of the integrator is the end of an interval
         self.first, self.span = here.t, self.end - here.t or 1.0
         self.part, self.quota = here.start.part, int(clock.count.quota)
         self.segment_end_finder = SegmentEnd(self.part, clock)
@@ -413,9 +409,8 @@ class EventDrivenMotion:
             self.begin()
             engine.begin(here.clock)
             self.intervals = SmoothIntervals(here.clock, known, self._until)
-            if (
-                here.start.before is not None and self.sampled()
-            ):  # sampling was still due at the end of the earlier motion: it may cause events
+            # a sampling that was still due at the end of the earlier motion may cause events
+            if here.start.before is not None and self.sampled():
                 here.clock.count.status = ex.RUNNING
                 self.turned()
             while not here.stopped:
@@ -430,7 +425,7 @@ class EventDrivenMotion:
             here.clock.count.status = ex.RUNNING
             return np.concatenate(self.rows), True
         except FlyballError as error:
-            if isinstance(error, ModelError) and not here.t > self.first:  # the description is wrong
+            if isinstance(error, ModelError) and not here.t > self.first:  # the model is invalid
                 raise
             here.failed = error
         finally:
@@ -454,7 +449,7 @@ class EventDrivenMotion:
             self.loop.desk.side[:], self.loop.desk.g[:] = before.desk.side, before.desk.g
         clock.count.started, clock.count.status = 0, ex.RUNNING
         if to not in IMPLICIT_METHODS and not clock.real.step:
-            clock.real.h = 0.0  # as at a start
+            clock.real.h = 0.0  # chosen as at the start
 
     def turned(self) -> bool:
         """Change the method where that pays, or where the present one is not applicable. Returns whether it changed."""
@@ -611,8 +606,7 @@ class EventDrivenMotion:
         """Resolve the instant after a possible jump of forces.
 
         Active rows may have to open, and stops at their bound may be pressed. No guard has crossed zero there.
-        ``before``:
-        values of event expressions before that time, across which they are not followed.
+        ``before``: values of event expressions before that time, across which they are not followed.
         """
         here = self.here
         if isinstance(self.loop, GuardedLoop):

@@ -72,7 +72,8 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
     unit, what = "m" if metric else "rad", switch_quantity(n, s)
     if isinstance(e, Touch):
         return InitialOverlap(
-            f"{e.title}: {body_names(e)} overlap at the start by {n.W.modes.lower[s] - n.x[s]:.3g} m; move one of them, "
+            f"{e.title}: {body_names(e)} overlap at the start by {n.W.modes.lower[s] - n.x[s]:.3g} m; move one "
+            "of them, "
             f"or give method='impulse', which puts them side by side"
         )
     if n.kind[s] == STOP:
@@ -138,7 +139,8 @@ def no_admissible_forces(n: InstantProblem, found: ModeDecision) -> UnresolvedIn
         why = "what they hold cannot be held together: one of them must give way"
     else:
         why = (
-            f"no loads were found that go with the friction of {' and '.join(element_titles(n, sliding))}. Either it grows "
+            f"no loads were found that go with the friction of {' and '.join(element_titles(n, sliding))}. "
+            "Either it grows "
             "with the load that it makes itself faster than that can hold it (a jam, or Painleve's paradox): with less "
             "friction, or an elastic stop or joint, there is a solution. Or there is one, and the search ended short "
             "of it"

@@ -240,7 +240,7 @@ def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, en
 
 
 def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) -> Distribution | None:
-    """Return the distribution with the largest margin that holds these rows; None if they cannot be at rest together."""
+    """Return the distribution of largest margin that holds these rows; None if they cannot be at rest together."""
     n, d = len(P.b), force_scales(P.A)
     driven = np.flatnonzero(P.rule == SLIDING)
     M, r, s = np.zeros((n, n)), np.zeros(n), 1.0 / d
@@ -286,8 +286,7 @@ def released_by_group(n: InstantProblem, parts: list[ProblemRow], fired: np.ndar
     """Return the rows that slide or open where no distribution within the bounds is left, with their new rules.
 
     Friction limits are reduced slightly. Rows that then move slide in the direction of that motion. If none does, rows
-    that
-    carry no force in any distribution open.
+    that carry no force in any distribution open.
     """
     if not n.fired(fired, G_SHARED):
         return {}

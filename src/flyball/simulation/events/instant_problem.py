@@ -83,9 +83,7 @@ class ProblemRow(NamedTuple):
     switch: int
     rule: int
     sign: float = 1.0
-    way: float = (
-        0.0  # direction (or STATIC) at which the friction law is evaluated; 0: limit is const + gain on row ``of``
-    )
+    way: float = 0.0  # direction (or STATIC) of the friction law; 0: the limit is const + gain on row ``of``
     rate: float = 0.0
     lean: float = 0.0
     const: float = 0.0
@@ -333,14 +331,14 @@ def reference_rate(here: EventContext) -> float:
     """Return a reference rate [1/s], to which velocities (per length) and accelerations (squared) are compared.
 
     It is the characteristic rate of the mechanism, or the inverse of the motion's duration where that is slower. A
-    short
-    duration does not raise it: a force of the weight of a body at rest counts, however little it would move the body.
+    short duration does not raise it: a force of the weight of a body at rest counts, however little it would move the
+    body.
     """
     return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
 
 
 def instant_problem(here: EventContext) -> InstantProblem:
-    """Return the `InstantProblem` of a motion at the present instant; reused while tables and workspace are the same."""
+    """Return the `InstantProblem` of a motion at the present instant, reused with the same tables and workspace."""
     n = here.instant_problem
     if n is None or n.S is not here.c.system or n.W is not here.c.work:
         here.instant_problem = n = InstantProblem(here)
@@ -419,8 +417,7 @@ def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_
     """Return the rows of the slips of a gap, which is row ``at``.
 
     With ``known_direction`` a sliding contact slides in its present direction; else the direction is solved for, as in
-    an
-    impact.
+    an impact.
     """
     own = slips_at_gap(n, gap)
     if not own:
@@ -494,9 +491,7 @@ def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.
             W.modes.mode[own], ways[own] = HELD, 0.0
             continue
         d = lean[rows]
-        if (
-            state[i] == DISC_SLIPS
-        ):  # in the direction of the acceleration; opposite to the friction force if that is zero
+        if state[i] == DISC_SLIPS:  # along the acceleration; opposite to the friction force if that is zero
             d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
             d = d / np.linalg.norm(d)
         if n.mode[own[0]] == OFF and _slip_continues(n, own):

@@ -312,9 +312,7 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
     write_sharing_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
         W.counts.load_updates = SLOPES_UNKNOWN
-        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = (
-            0.0  # of two solutions take the one reached from zero load
-        )
+        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from zero load
 
 
 # Rates in event expressions that active rows keep at zero: their values are rounding.

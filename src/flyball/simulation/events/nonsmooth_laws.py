@@ -120,7 +120,7 @@ def remove_rates(n: InstantProblem, rows: np.ndarray, misses: np.ndarray) -> Non
 
 
 def inverse_of_slopes(B: np.ndarray) -> np.ndarray:
-    """Return the inverse of B (sides by rates); where B is singular, sides are scaled in proportion to their effects."""
+    """Return the inverse of B (sides by rates); where B is singular, sides are weighted by their effects."""
     scale = 1.0 / np.maximum(np.abs(B).max(axis=1), 1e-300)
     N = scale[:, None] * B
     most = np.linalg.norm(N, axis=0)

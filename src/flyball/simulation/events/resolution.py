@@ -132,7 +132,7 @@ def update_elastic_stops(n: InstantProblem, fired: np.ndarray, previous: np.ndar
 
 
 def _pressed_side(n: InstantProblem, s: int, old: float, hit: set[int]) -> float:
-    """Return 1 if pressed at the lower side, -1 at the upper, 0 if open; `UNDECIDED_SIDE` less `FROZEN` if undecided."""
+    """Return 1 if the lower side is pressed, -1: the upper, 0: none; `UNDECIDED_SIDE` less `FROZEN` if undecided."""
     k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
     now = 0.0
     bounds = n.W.modes.lower, n.W.modes.upper
@@ -270,13 +270,7 @@ def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: flo
 
 MOST_ROUNDS = 100
 MOST_REPEATS = 5  # repeated decisions of sliding directions for the same modes
-RATE_GUARDS = (
-    G_SLIDES,
-    G_BACK,
-    G_TURNS,
-    G_PRESS_LOWER,
-    G_PRESS_UPPER,
-)  # guards of rates, or whose meaning depends on rates
+RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards that depend on rates
 HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of active rows, by the forces that they carry
 BROKEN_FORCE = 1e-8  # part of its terms beyond which a force violates its bound
 VIOLATED_START = 1e-9  # violation that is refused at the start, relative to length or a radian (rates: times the rate)

@@ -238,7 +238,8 @@ class VariationalIntegrator:
         n, z = int(S.row_start[nr]), np.zeros
         self.desk = VariationalStepWorkspace(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
-            np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((REMEMBERED_STEPS, nr)), z((REMEMBERED_STEPS, nv)),
+            np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((REMEMBERED_STEPS, nr)),
+            z((REMEMBERED_STEPS, nv)),
         )  # fmt: skip
 
     def bind(

@@ -261,9 +261,7 @@ class JacobianLayout:
         rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
         groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
         order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
-        one = np.r_[
-            self._together(), self.nv + np.arange(n // stages - self.nv)
-        ]  # increments of a quaternion stay together
+        one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # those of a quaternion together
         first = np.tile(np.arange(n // stages) < self.nv, stages)
         place = np.empty(n, np.int64)
         place[np.lexsort((np.arange(n), np.where(first, np.tile(one, stages), order), ~first))] = np.arange(n)

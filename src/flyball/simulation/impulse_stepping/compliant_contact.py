@@ -65,7 +65,7 @@ def contact_law(G, C, L, c):
 
 @formula
 def contact_stiffness(G, C, L, c):
-    """Return the stiffness of contact c, 0 if it is rigid; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
+    """Return the stiffness of contact c, 0 if rigid; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
     _, _, _, k, modulus = contact_law(G, C, L, c)
     if modulus > 0.0:
         s = 0.0
@@ -161,7 +161,7 @@ def elastic_overlap(share, overlap, target):
 
 @formula
 def start_overlap(now, c, k, n, new):
-    """Set the overlap of contact c at the start of the step; return the energy not accounted for by its spring.
+    """Set the overlap of contact c at the start of the step; return the elastic energy that this adds without work.
 
     A contact too stiff for the step has the overlap with which its law ended. Rotation of the surfaces increases the
     overlap, which displacements remove. Appearing contact points take over the energy of disappearing ones.

@@ -367,7 +367,7 @@ def restore_poses(N, M):
 
 @formula
 def middle_rows(G, M, C, H, P, L, now):
-    """Set the rows of persistent contacts from poses and contacts ``H`` in the middle. Returns whether there are any."""
+    """Set the rows of persistent contacts from poses and contacts ``H`` in the middle; return whether there are any."""
     found = False
     for k in range(H.count[FOUND]):
         c = H.at[k, BEFORE]
@@ -424,8 +424,7 @@ def account_contact(P, X, c, u, pace, now):
 
     For a persistent contact, work along the normal is a numerical error, and so is work along its tangents if it sticks
     before and after. Friction never supplies energy: a negative mean loss is added to the other account, whose sum with
-    it
-    is exact.
+    it is exact.
     """
     n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     store3(now, c, HISTORY_IMPULSE, to_world_frame(P, c, n, s, t))

@@ -178,10 +178,8 @@ def displace_bodies(N, M, X, displacements, pace):
     """Compute positions and orientations at the end of the step.
 
     Bodies move with the velocities at the end and the additional displacements: x += h v + h d, where d is ``N.move``
-    plus
-    ``displacements``. Rotation by v conserves energy and angular momentum. The rotation d also rotates the velocities,
-    so
-    that it changes no energy. The change of gravity's energy by displacements is accounted as numerical.
+    plus ``displacements``. Rotation by v conserves energy and angular momentum. The rotation d also rotates the
+    velocities, so that it changes no energy. The change of gravity's energy by displacements is accounted as numerical.
     """
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):

@@ -7,10 +7,9 @@ A force s along J v, with stiffness k and damping c, is taken at
 where x is the position at half the step, and r- and r+ are the rates at the ends of the step: J v- and J v+ less and
 plus h / 2 times the bias acceleration. With b = 0 this is the trapezoidal rule, which conserves the energy of a linear
 spring; with b = 1 a stiff spring is at rest after two steps. In between it is stable for any h, k, c: with z = h^2 k /
-m
-the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z), where b' = (1 + 3 b) / 4. b grows with the
-square of z, so that the step stays of second order. M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by the
-Sherman-Morrison-Woodbury formula.
+m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z), where b' = (1 + 3 b) / 4. b grows with
+the square of z, so that the step stays of second order. M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by
+the Sherman-Morrison-Woodbury formula.
 
 The end of a rotating stiff spring leaves the line along which the spring was linearised by w^2 h^2 / 8 of its length,
 more than a stiff spring ever deflects. Its length at the end of the step is therefore corrected along its own response.

@@ -135,8 +135,7 @@ class OutputRecorder:
         """Return the contacts with a force, and their normals, which are those of the middle of the step.
 
         Contact points are given by the arms with which forces were computed, from the mass centres at the start of the
-        step;
-        between two moving bodies the mean of both. The torques in the table are thus those of the motion.
+        step; between two moving bodies the mean of both. The torques in the table are thus those of the motion.
         """
         s = self.stepper
         C, kept = s.last()

@@ -8,8 +8,7 @@ have an impact with the velocities at the start:
 - Newton: u+ >= -e u- normal to the contact; Moreau: the same along all three directions.
 
 No law may add energy: the expansion is reduced to what the energy lost in the inelastic impact allows (Newton's law
-with
-friction could add energy: Kane and Levinson, 1985). Impacts are repeated until no contact has an impact.
+with friction could add energy: Kane and Levinson, 1985). Impacts are repeated until no contact has an impact.
 
 Sequential impacts, as in Newton's cradle: the contact that closes fastest has the first impact, by Poisson's law, until
 none closes.
@@ -247,7 +246,7 @@ def copy_velocities(X, E):
 
 @formula
 def find_impacts(G, C, at, bias, R, X, L, pace, now):
-    """Return whether there are impacts; set the biases of their contacts, and store the velocities before in ``now``."""
+    """Return whether there are impacts; set the biases of their contacts, and store their velocities in ``now``."""
     if pace.count[RESTITUTION_LAW] == NO_RESTITUTION:
         return False
     h = pace.real[STEP]

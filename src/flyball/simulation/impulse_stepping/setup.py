@@ -137,12 +137,14 @@ def mechanism_tables(
     S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = single_rows(s, S, stops or {})
     A = MechanismTables(
-        S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes), np.zeros(1, np.int64),
+        S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes),
+        np.zeros(1, np.int64),
         real=MechanismReals.blank(), count=MechanismCounts.blank(),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
         group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
         spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
-        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)), weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
+        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)),
+        weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
         line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
         job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
         pose=np.zeros((len(rows), 12)),
@@ -184,8 +186,7 @@ def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the group of each row of the body table (-1: immovable), and the start of each group's velocities.
 
     Groups are connected by rows, measured quantities and forces. All velocities form one group if those of some group
-    are
-    not contiguous.
+    are not contiguous.
     """
     part = np.arange(nv)
 

@@ -24,11 +24,11 @@ FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 1
 ANGLE = 6  # column of FreeBodies.move after velocities: rotation [rad] about z since the start, if inertia is isotropic
 # columns of ContactHistory.kept: impulse in world axes; 1 if sliding, 0 if sticking, -1 without force; whether it has
 # an impact, the impact's impulse in world axes, and the velocities before it; of compliant contacts: stiffness (0:
-# rigid), overlap and its rate at the start of the step, implicit share s, overlap of the law and gap at the end, overlap
-# that stores elastic energy; torque impulse in world axes; relative angular velocity before an impact; part of the bias
-# that is no velocity of a surface or gap; relative velocity at the start of the step, in world axes; whether it is
-# persistent: 0 no, PRESSES (it pressed in the step before and is at rest along the normal), MIDDLE_WANTED (its rows
-# are also needed in the middle of the step), MIDDLE_FOUND (they were found, and its bias is that of the mean)
+# rigid), overlap and its rate at the start of the step, implicit share s, overlap of the law and gap at the end, part
+# of the overlap that stores elastic energy; torque impulse in world axes; relative angular velocity before an impact;
+# part of the bias that is no velocity of a surface or gap; relative velocity at the start of the step, in world axes;
+# whether it is persistent: 0 no, PRESSES (it pressed in the step before and is at rest along the normal), MIDDLE_WANTED
+# (its rows are also needed in the middle of the step), MIDDLE_FOUND (they were found, and its bias is that of the mean)
 HISTORY_IMPULSE, HISTORY_SLIDING, HISTORY_HIT, HISTORY_IMPACT_IMPULSE, HISTORY_IMPACT_VELOCITY = 0, 3, 4, 5, 8
 (
     HISTORY_STIFFNESS,
@@ -70,13 +70,13 @@ TIME, STEP, GRAVITY, NO_BOUNCE_BELOW, NO_OVERLAP_BELOW, VELOCITY_TOLERANCE, POSI
 STORED_ENERGY, STORED_AT_START = 18, 19  # energy in compliant contacts: now, and at the start
 LAST_STEP = 20  # the step before, 0 if there was none
 NUMERICAL = 21  # energy lost numerically: rows that change within a step, displacements out of overlaps, damping
-LONGEST_STEP = 22  # the step before it is divided
+LONGEST_STEP = 22  # the undivided step
 LAST_RESIDUAL = 23  # residual [m/s] of the last solve for velocities
 REALS = 24
 # entries of RunState.count: steps still to take, steps taken; largest number of iterations for velocities and
 # positions; law of restitution; iterations done, unconverged solves, largest number of contacts; number of impacts, and
-# of those with reduced expansion; whether impacts are sequential; whether there may be compliant contacts, and whether a
-# step that is too long for their impacts is divided; steps whose impacts did not end
+# of those with reduced expansion; whether impacts are sequential; whether there may be compliant contacts, and whether
+# a step that is too long for their impacts is divided; steps whose impacts did not end
 (
     STEPS_LEFT,
     STEPS_TAKEN,
@@ -105,7 +105,7 @@ class FreeBodies(NamedTuple):
     body: Float2  # (n, 16)
     turn: Float2  # (n, 4): unit quaternion, body axes to the world
     before: Float2  # (n, 8): velocities at the start of the step
-    move: Float2  # (n, 8): velocities that bodies are displaced with
+    move: Float2  # (n, 8): displacement velocities
     start: Float2  # (movers, 18): poses of all movers at the start of the step, and twists
 
 

@@ -1,5 +1,5 @@
-"""A mechanism's equations as a document: what stands in it, and how it is written as text, LaTeX and web page.
+"""A mechanism's equations as a document: its contents, and its output as text, LaTeX and web page.
 
-`contents` says what stands where, as traced; `document` simplifies and names what recurs; `parts` are sections,
-formulas and tables; `writers` make text and LaTeX, `view.equations_page` the page.
+`contents` builds the sections from the traced equations; `document` simplifies and names common subexpressions;
+`parts` defines sections, formulas and tables; `writers` write text and LaTeX, `view.equations_page` the web page.
 """

@@ -1,4 +1,4 @@
-"""What stands in the document of a mechanism's equations, section by section; expressions as traced, not yet short."""
+"""Contents of the document of a mechanism's equations, section by section, with traced, unsimplified expressions."""
 
 from __future__ import annotations
 
@@ -35,11 +35,12 @@ if TYPE_CHECKING:
     from ..equations import Equations
 
 ZERO = Tex("0", "0")
-LARGE_MATRIX = 14  # velocities from which on rows of the equations of motion are not written out each
+# From so many velocities on, the equations of motion are not written out row by row.
+LARGE_MATRIX = 14
 
 
 def bold(letter: str, plain_text: str = "") -> Tex:
-    """A matrix or vector."""
+    """Bold letter of a matrix or vector."""
     style = "boldsymbol" if letter.startswith("\\") else "mathbf"
     return Tex(rf"\{style}{{{letter}}}", plain_text or letter.strip("\\"))
 
@@ -55,7 +56,7 @@ def expression_cell(x: Any) -> Cell:
 
 
 def mechanism_tables(eq: Equations) -> Section:
-    """Bodies with what they weigh, joints with what they are made of, forces, drivers."""
+    """Tables of bodies with masses, joints with building blocks, forces and drivers."""
     m, s = eq.model, eq.named_equations.values.structure
     S = eq.named_equations.traced.system
     out: list[Block] = [Paragraph(f"{'Planar' if m.planar else 'Spatial'} mechanism. Coordinates: {eq.coordinates}.")]
@@ -110,7 +111,7 @@ def joint_blocks(e: Any) -> str:
 
 
 def symbols(used: list[Node]) -> Section:
-    """The symbols that occur, with meaning, unit and the parameters' values."""
+    """Table of the symbols that occur, with meaning, unit and the parameters' values."""
     rows: dict[bool, list[tuple[Cell, ...]]] = {False: [], True: []}
     for x in used:
         if x.data.kind not in ("shared", "constant"):
@@ -124,7 +125,7 @@ def symbols(used: list[Node]) -> Section:
 
 
 def coordinates(eq: Equations) -> Section:
-    """Q, v and how they go together."""
+    """Coordinates q, velocities v and their relation."""
     T = eq.named_equations.traced
     out: list[Block] = []
     if T.q:

@@ -1,4 +1,4 @@
-"""The document of a mechanism's equations, simplified, with symbols for what has a meaning or recurs."""
+"""Document of a mechanism's equations, simplified, with symbols for kinematic quantities and common subexpressions."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from ..equations import Equations
 
 
-FEW_OPERATIONS = 2500  # operations up to which everything is written out first
-BRIEF_COUNT = 4.0  # symbols below which a part has no name
-READABLE_COUNT = 900.0  # symbols of all equations together up to which that stays
+FEW_OPERATIONS = 2500  # up to so many operations everything is written out first
+BRIEF_COUNT = 4.0  # parts with fewer symbols get no name
+READABLE_COUNT = 900.0  # the written-out form is kept up to so many symbols in all equations
 
 
 Candidate = tuple[Any, Symbol]
 
 
 def name_parts(nodes: Sequence[Any], candidates: Sequence[Candidate]) -> tuple[list[Any], Definitions, list[Candidate]]:
-    """Expressions with symbols for parts that have a meaning, what these stand for, and which candidates they are.
+    """Expressions with symbols for meaningful parts; also their definitions and the candidates used.
 
-    A part that is a number times something is named too where another multiple of it stands.
+    If a part is a number times something, other multiples of it use its symbol, too.
     """
     wanted: dict[int, tuple[float, Candidate]] = {}
     for x, symbol in candidates:
@@ -57,7 +57,7 @@ def name_parts(nodes: Sequence[Any], candidates: Sequence[Candidate]) -> tuple[l
 def simplify_with_names(
     nodes: Sequence[Any], units: Sequence[Sequence[Node]], candidates: Sequence[Candidate]
 ) -> tuple[list[Any], Definitions]:
-    """Expressions made short, and parts with names: with these, or without, as is shorter."""
+    """Simplify expressions with or without names for parts, whichever is shorter."""
     found: list[Any] | None = None
     if len(nodes_in_order(nodes)) <= FEW_OPERATIONS or not candidates:
         found = simplified(nodes, units=units)
@@ -77,8 +77,8 @@ def simplify_with_names(
     return other, [(x, y) for (x, _), y in zip(meant, defined, strict=True)]
 
 
-LONG_EXPRESSION = 400.0  # symbols in parts that are added up once more
-KINEMATIC_PARTS = (  # of the record of a body: place, letter, name, what
+LONG_EXPRESSION = 400.0  # parts with more symbols are summed once more
+KINEMATIC_PARTS = (  # entries of a body record: index, letter, name, meaning
     (3, 9, "R", "R"),
     (0, 3, "p", "p"),
     (12, 3, r"\omega", "omega"),
@@ -89,7 +89,7 @@ KINEMATIC_PARTS = (  # of the record of a body: place, letter, name, what
 
 
 def document(eq: Equations) -> Document:
-    """Everything about a mechanism's equations, short and in order.
+    """Build the document of a mechanism's equations.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def document(eq: Equations) -> Document:
 
 
 def as_sums(made: Document, units: list[list[Node]]) -> None:
-    """Right sides that are sums of others, by these, where that is shorter: each by itself has cancelled more."""
+    """Write right-hand sides as sums of others, where that is shorter: each by itself has cancelled more."""
     blocks = [b for s in made.sections for b in s.blocks if isinstance(b, Formulas)]
     sums = [
         f for b in blocks for f in b.formulas if f.parts and symbol_count([p.right for p in f.parts]) <= LONG_EXPRESSION
@@ -141,7 +141,7 @@ def as_sums(made: Document, units: list[list[Node]]) -> None:
 
 
 def without_zeros(made: Document) -> None:
-    """Without what has turned out to be zero: products, and forces."""
+    """Remove products and forces that turned out to be zero."""
     for section in made.sections:
         for block in section.blocks:
             if isinstance(block, Formulas):
@@ -155,20 +155,20 @@ def without_zeros(made: Document) -> None:
 
 
 def added_symbols(sections: list[Section]) -> list[Node]:
-    """Symbols beside expressions."""
+    """Symbols that occur outside of expressions."""
     formulas = [f for s in sections for b in s.blocks if isinstance(b, Formulas) for f in b.formulas]
     return [x for f in formulas for _, x in (*f.before, *f.after)]
 
 
 def size_description(eq: Equations) -> str:
-    """Sizes, in words."""
+    """Text with the sizes of the equations."""
     count = {"coordinate": len(eq.q), "velocity": len(eq.v), "constraint": len(eq.lam)}
     many = {"velocity": "velocities"}
     return ", ".join(f"{n} {k if n == 1 else many.get(k, k + 's')}" for k, n in count.items())
 
 
 def candidate_symbols(eq: Equations) -> list[tuple[Any, Symbol]]:
-    """Kinematics of the bodies, which have names where they are long."""
+    """Kinematic quantities of the bodies, which get names where they are long."""
     x = eq.named_equations
     if x.values.structure.model.planar:
         return []
@@ -187,7 +187,7 @@ def candidate_symbols(eq: Equations) -> list[tuple[Any, Symbol]]:
 
 
 def definition_formulas(definitions: Definitions) -> list[Formula]:
-    """Symbols and what they stand for, as formulas."""
+    """Definitions of symbols, as formulas."""
     return [Formula(Tex(latex_symbol(x.data), x.data.name), y) for x, y in definitions]
 
 

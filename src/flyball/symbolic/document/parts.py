@@ -42,7 +42,7 @@ MEANINGS = {
 
 
 def symbol_meaning(symbol: Symbol) -> str:
-    """What a symbol means."""
+    """Meaning of a symbol."""
     what = symbol.name.removeprefix(f"{symbol.element}.") if symbol.element else ""
     plain = what.rstrip("'")
     order = ("", "rate of the ", "second rate of the ")[min(len(what) - len(plain), 2)]
@@ -53,12 +53,12 @@ def symbol_meaning(symbol: Symbol) -> str:
 
 
 def unit_text(text: str) -> str:
-    """A unit as it is read."""
+    """Unit in readable form."""
     return "" if text in ("", "1") else text.replace("*", " ").replace("^2", "²")
 
 
 def connected_parts(e: Any) -> str:
-    """What an element joins or acts on."""
+    """Parts that an element connects or acts on."""
     if hasattr(e, "body_i"):
         return f"{e.body_i} – {e.body_j}"
     if hasattr(e, "bodies"):
@@ -89,7 +89,7 @@ Cell = str | Tex
 
 
 Products = list[tuple[Any, Node]]
-"""Expressions and the symbols that they are multiplied with."""
+"""Expressions and the symbols that multiply them."""
 
 
 @dataclass
@@ -101,12 +101,12 @@ class Formula:
     unit: str = ""
     before: Products = field(default_factory=list)
     after: Products = field(default_factory=list)
-    parts: list[Formula] = field(default_factory=list)  # those whose right sides add up to this one's
+    parts: list[Formula] = field(default_factory=list)  # formulas whose right-hand sides add up to this one
 
 
 @dataclass
 class Formulas:
-    """Formulas under one another, with a heading of their own."""
+    """A list of formulas with a heading."""
 
     title: str
     formulas: list[Formula]
@@ -115,7 +115,7 @@ class Formulas:
 
 @dataclass
 class Matrix:
-    """left = a matrix whose rows and columns belong to something."""
+    """left = a matrix with labelled rows and columns."""
 
     left: Tex
     entries: np.ndarray
@@ -141,7 +141,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Display:
-    """A formula that is told, not computed."""
+    """A formula given as text."""
 
     formula: Tex
 
@@ -151,7 +151,7 @@ Block = Formulas | Matrix | DataTable | Paragraph | Display
 
 @dataclass
 class Section:
-    """A heading and what stands below it."""
+    """A heading with its blocks."""
 
     name: str
     title: str
@@ -160,14 +160,14 @@ class Section:
 
 @dataclass
 class Document:
-    """Title, a line below it, sections."""
+    """A document: title, subtitle, sections."""
 
     title: str
     subtitle: str
     sections: list[Section]
 
     def expressions(self) -> list[Any]:
-        """All expressions in it."""
+        """All expressions in the document."""
         out: list[Any] = []
         for block in self._blocks():
             if isinstance(block, Matrix):
@@ -178,7 +178,7 @@ class Document:
         return out
 
     def put(self, expressions: list[Any]) -> None:
-        """Others in their places."""
+        """Replace all expressions."""
         given = iter(expressions)
         for block in self._blocks():
             if isinstance(block, Matrix):

@@ -14,7 +14,7 @@ ZERO = Tex("0", "0")
 
 
 def formula_width(latex: str) -> int:
-    """About how many letters wide a formula is; those of indices count less."""
+    """Approximate width of a formula in characters; those of indices count less."""
     told = re.sub(r"\\(begin|end)\{\w+\}|\\(left|right|quad|,|mathbf|boldsymbol|sqrt|ddot|dot)", "", latex)
     told = re.sub(r"\\(text|mathrm|operatorname)\{", "{", told)
     told = re.sub(r"\\(sin|cos|tan)", r"\1", told)
@@ -43,12 +43,12 @@ def aligned_lines(formula: Formula, most: int) -> str:
 
 
 def joined_terms(more: str) -> str:
-    """What is added to something, with its sign."""
+    """Added terms with their signs."""
     return f" - {more[1:]}" if more.startswith("-") else f" + {more}"
 
 
 def nonzero_entries(matrix: Matrix) -> list[Formula]:
-    """What stands in a matrix that is not zero, entry by entry."""
+    """Nonzero entries of a matrix, as formulas."""
     out = []
     for k, x in _matrix_entries(matrix):
         if matrix.symmetric and k[0] > k[-1]:
@@ -67,7 +67,7 @@ def _matrix_entries(matrix: Matrix) -> list[tuple[tuple[int, ...], object]]:
 
 
 def _entry_letter(latex: str) -> str:
-    """The letter of a matrix as that of its entries."""
+    """Letter of the entries of a matrix."""
     found = re.fullmatch(r"\\mathbf\{(\w)\}", latex)
     return found[1] if found else latex
 
@@ -87,7 +87,7 @@ TEXT_WIDTH = 100
 
 
 def text_document(document: Document, width: int = TEXT_WIDTH) -> str:
-    """The document, for printing."""
+    """The document as plain text."""
     out = [document.title, "=" * len(document.title), document.subtitle]
     for section in document.sections:
         out += ["", section.title, "-" * len(section.title)]
@@ -143,7 +143,7 @@ def text_table(rows: Sequence[Sequence[Cell]]) -> list[str]:
     return ["  " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in texts]
 
 
-LATEX_WIDTH = 84  # letters in a line of a formula
+LATEX_WIDTH = 84  # characters per line of a formula
 LATEX_MATRIX_WIDTH = 84
 LATEX_PREAMBLE = r"""\documentclass[10pt,a4paper,fleqn]{article}
 \usepackage[utf8]{inputenc}

@@ -1,11 +1,11 @@
 """Kinematic loops solved in closed form, recognised by the form of their equations.
 
-Equations are processed by rules until none is left, or no rule fits; no rule asks which mechanism it is:
+Rules are applied until no equation is left or no rule fits. No rule depends on the type of mechanism:
 
     one unknown in an equation                               solved (linear, a cosine and a sine, quadratic)
-    an unknown that stands linearly, with a known factor     substituted into the other equations
+    an unknown that occurs linearly, with a known factor     substituted into the other equations
     a slide in two equations, along a known direction        eliminated from both
-    angles that follow one another                           measured from the first: e(v) e(w) = e(v + w)
+    angles that occur only as a sum                          measured from the first: e(v) e(w) = e(v + w)
     two equations of two angles, or of an angle and a slide  dyads (Assur groups of two links)
 
 The dyads close in circles and straight lines (Artobolevsky 1951; Angeles and Bai 2022):
@@ -13,9 +13,8 @@ The dyads close in circles and straight lines (Artobolevsky 1951; Angeles and Ba
     RRR   p + P e(w) + N e(v) = 0         |p + P e(w)|^2 = |N|^2
     RPR   (s N + L) e(w) + k = 0          |s N + L|^2 = |k|^2
 
-e(w) = (cos w, sin w); N, P, L rotate and scale (or reflect): their columns have equal length and are at right
-angles. The branch is that of the reference configuration. Angles are followed through the whole range of motion
-without jumps.
+e(w) = (cos w, sin w). N, P, L rotate and scale (or reflect): their columns have equal length and are perpendicular. The
+branch is that of the reference configuration. Angles are continued without jumps through the whole range of motion.
 """
 
 from __future__ import annotations
@@ -35,35 +34,35 @@ from .definitions import Definition
 from .zero_test import Probe
 
 Affine = tuple[Any, list[tuple[Any, Any]]]
-"""Constant, and the factors of cosine and sine of each angle."""
+"""Constant, and the coefficients of cosine and sine of each angle."""
 
 
 class FormMismatch(Exception):
-    """An equation is not what a rule solves."""
+    """An equation does not have the form that a rule solves."""
 
 
 def at_zero(x: Node, w: Node) -> Any:
-    """An expression where a symbol is zero."""
+    """The expression with a symbol set to zero."""
     return substitute([x], [(w, 0.0)])[0]
 
 
 def contains_symbol(x: Any, w: Node) -> bool:
-    """Whether a symbol stands in an expression."""
+    """Whether a symbol occurs in an expression."""
     return isinstance(x, Node) and any(s is w for s in symbols_of([x]))
 
 
 def depends_on(x: Any, w: Node, probe: Probe) -> bool:
-    """Whether an expression changes with a symbol."""
+    """Whether the value of an expression depends on a symbol."""
     return contains_symbol(x, w) and not probe.zero(directional_derivatives([x], [(w, 1.0)])[0], probe.size(x))
 
 
 def split_angles(x: Node, angles: Sequence[Node]) -> tuple[Node, list[tuple[Node, Node]]]:
-    """An expression in cosines and sines of angles by themselves: symbols for these are returned with it.
+    """Rewrite an expression in cosines and sines of single angles, with symbols for these; returns both.
 
     Raises
     ------
-    NotOfThisForm
-        If an angle stands elsewhere.
+    FormMismatch
+        If an angle occurs elsewhere.
     """
     g = x.graph
     atoms = [(_atom(g, "cos", w), _atom(g, "sin", w)) for w in angles]
@@ -84,7 +83,7 @@ def _atom(g: Graph, what: str, w: Node) -> Node:
 
 
 def _turned(argument: Node, angles: Sequence[Node], atoms: list[tuple[Node, Node]]) -> tuple[Any, Any]:
-    """Cosine and sine of a sum of angles and of what is known."""
+    """Cosine and sine of a sum of unknown angles and known terms."""
     (rest,) = substitute([argument], [(w, 0.0) for w in angles])
     c, s = cos(rest), sin(rest)
     for w, (cw, sw) in zip(angles, atoms, strict=True):
@@ -98,12 +97,12 @@ def _turned(argument: Node, angles: Sequence[Node], atoms: list[tuple[Node, Node
 
 
 def harmonic_form(x: Node, angles: Sequence[Node], probe: Probe) -> Affine:
-    """Read an equation as k + sum of a cos w + b sin w.
+    """Coefficients of an equation of the form k + sum of a cos w + b sin w.
 
     Raises
     ------
-    NotOfThisForm
-        If it is another.
+    FormMismatch
+        If it has another form.
     """
     form, atoms = split_angles(x, angles)
 
@@ -129,7 +128,7 @@ def harmonic_form(x: Node, angles: Sequence[Node], probe: Probe) -> Affine:
     return k, factors
 
 
-DEAD_CENTRE = 1e-9  # part of what cancels in a discriminant, below which the branches meet
+DEAD_CENTRE = 1e-9  # discriminant below this part of its cancelling terms: the branches meet
 
 
 class Solution:
@@ -139,11 +138,11 @@ class Solution:
     ----------
     value : Node
     how : str
-        Form of the equation and branch.
+        Form of the equation, and the branch.
     never : list of Node
-        What must not vanish or become negative.
+        Expressions that must not vanish or become negative.
     radius : Node or number, optional
-        sqrt(x^2 + y^2) of atan2(y, x), where that is known.
+        sqrt(x^2 + y^2) of atan2(y, x), if known.
     """
 
     radius: Any = None
@@ -157,8 +156,8 @@ def solve_single(x: Node, w: Node, probe: Probe) -> Solution:
 
     Raises
     ------
-    NotOfThisForm
-        If no formula is known for it.
+    FormMismatch
+        If there is no formula for it.
     """
     for rule in (linear_unknown, harmonic_unknown, quadratic_unknown):
         try:
@@ -169,7 +168,7 @@ def solve_single(x: Node, w: Node, probe: Probe) -> Solution:
 
 
 def linear_unknown(x: Node, w: Node, probe: Probe) -> Solution:
-    """A w + b = 0."""
+    """Solve a w + b = 0."""
     slope = directional_derivatives([x], [(w, 1.0)])[0]
     if probe.zero(slope, probe.size(x)) or depends_on(slope, w, probe):
         raise FormMismatch
@@ -177,18 +176,18 @@ def linear_unknown(x: Node, w: Node, probe: Probe) -> Solution:
 
 
 def solve_linear(x: Node, slope: Any, w: Node) -> Solution:
-    """The same with a in hand."""
+    """Solve a linear equation with the known slope a."""
     return Solution(-at_zero(x, w) / slope, "linear", [slope] if isinstance(slope, Node) else [])
 
 
 def harmonic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
-    """A cos w + B sin w + C = 0: w = atan2(B, A) + s atan2(sqrt(A^2 + B^2 - C^2), -C), s = 1 or -1."""
+    """Solve A cos w + B sin w + C = 0: w = atan2(B, A) + s atan2(sqrt(A^2 + B^2 - C^2), -C), s = 1 or -1."""
     k, ((a, b),) = harmonic_form(rationalised(x, w), [w], probe)
     return solve_harmonic((a, b, k), w, probe)
 
 
 def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution:
-    """The same from its coefficients."""
+    """Solve it from its coefficients."""
     A, B, C = abc
     if A == 0.0 and B == 0.0:
         raise FormMismatch
@@ -210,7 +209,7 @@ def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution
 
 
 def quadratic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
-    """A w^2 + B w + C = 0 of a length w."""
+    """Solve A w^2 + B w + C = 0 for a length w."""
     x = rationalised(x, w)
     slope = directional_derivatives([x], [(w, 1.0)])[0]
     bend = directional_derivatives([slope], [(w, 1.0)])[0]
@@ -221,7 +220,7 @@ def quadratic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
 
 
 def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution:
-    """The same from its coefficients."""
+    """Solve it from its coefficients."""
     a, b, c = (w.graph.node(y) for y in abc)
     if probe.zero(a):
         raise FormMismatch
@@ -237,7 +236,7 @@ def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solutio
 
 
 def rationalised(x: Node, w: Node) -> Node:
-    """An equation sqrt(P) = R, in which R does not hold w, as P - R^2 = 0; others as they are."""
+    """Rewrite an equation sqrt(P) = R, with R independent of w, as P - R^2 = 0; others are returned unchanged."""
     terms = [x]
     inside: list[tuple[float, Node]] = []
     rest: Any = 0.0
@@ -261,7 +260,7 @@ Matrix = np.ndarray
 
 
 def eliminate_slide(x: UnknownPair, d: Sequence[Any], s: Node) -> tuple[Any, Solution]:
-    """Of two equations p + d s = 0, in which d holds nothing unknown: the one without s, and s.
+    """Eliminate s from two equations p + d s = 0 with a known d.
 
     Returns
     -------
@@ -276,12 +275,12 @@ def eliminate_slide(x: UnknownPair, d: Sequence[Any], s: Node) -> tuple[Any, Sol
 
 
 def rrr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
-    """Two angles (RRR).
+    """Solve two equations for two angles (RRR dyad).
 
     Returns
     -------
     list of Solution
-        Of the first and of the second, which holds the first.
+        For the first angle, and for the second, which depends on the first.
     """
     read = [harmonic_form(e, w, probe) for e in x]
     p = np.array([k for k, _ in read], object)
@@ -302,12 +301,12 @@ def rrr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solutio
 
 
 def rpr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
-    """An angle w[0] and a slide w[1] on the link that turns by it (RPR).
+    """Solve two equations for an angle w[0] and a slide w[1] on the link that turns by it (RPR dyad).
 
     Returns
     -------
     list of Solution
-        Of the slide, then of the angle.
+        For the slide, then for the angle.
     """
     angle, s = w
     slopes = [directional_derivatives([e], [(s, 1.0)])[0] for e in x]
@@ -333,7 +332,7 @@ def rpr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solutio
 
 
 def _turning(N: Matrix, probe: Probe) -> Any:
-    """The square by which N stretches; it must only turn (or turn over)."""
+    """Squared scale factor of N, which must be a rotation or reflection times a factor."""
     a, b = N[0, 0] * N[0, 0] + N[1, 0] * N[1, 0], N[0, 1] * N[0, 1] + N[1, 1] * N[1, 1]
     if not probe.same(a, b, probe.size(a)) or not probe.zero(N[0, 0] * N[0, 1] + N[1, 0] * N[1, 1], probe.size(a)):
         raise FormMismatch
@@ -341,7 +340,7 @@ def _turning(N: Matrix, probe: Probe) -> Any:
 
 
 def _mixed(N: Matrix, L: Matrix, probe: Probe) -> Any:
-    """Half of N^T L + L^T N, which must be a multiple of one."""
+    """Half of N^T L + L^T N, which must be a multiple of the identity."""
     a, b = (N[0, n] * L[0, n] + N[1, n] * L[1, n] for n in range(2))
     across = N[0, 0] * L[0, 1] + N[1, 0] * L[1, 1] + L[0, 0] * N[0, 1] + L[1, 0] * N[1, 1]
     size = max(probe.size(a), probe.size(b))
@@ -350,21 +349,21 @@ def _mixed(N: Matrix, L: Matrix, probe: Probe) -> Any:
     return a
 
 
-MAX_UNKNOWNS = 60  # unknowns up to which formulas are looked for
-MAX_ROUNDS = 4  # rules for each unknown: more lead nowhere
-MAX_OPERATIONS = 20000  # expressions that the equations may be made of
+MAX_UNKNOWNS = 60  # largest number of unknowns for which formulas are searched
+MAX_ROUNDS = 4  # rule applications per unknown
+MAX_OPERATIONS = 20000  # largest number of expressions in the equations
 
 
 class LoopSolver:
-    """Equations and unknowns that are left, and what has been found.
+    """Solver that applies the rules: remaining equations and unknowns, and the definitions found.
 
     Attributes
     ----------
     equations, unknowns, known : list of Node
     found : list of Definition
-        In an order in which each stands on those before.
+        Definitions in an order in which each depends on earlier ones only.
     later : list of Definition
-        Found from the others; in an order in which each stands on those behind.
+        Definitions computed from the others; each depends on later ones only.
     """
 
     def __init__(
@@ -377,7 +376,8 @@ class LoopSolver:
         self.never: list[tuple[str, Any]] = []
         self._changes: dict[tuple[int, int], bool] = {}
         self._bent: dict[tuple[int, int, int], tuple[Any, bool]] = {}
-        self._substituted_sums: set[str] = set()  # what is counted from where once is not counted back again
+        # sums already substituted, so that a substitution is not reversed
+        self._substituted_sums: set[str] = set()
         self._slopes: dict[tuple[int, int], Any] = {}
 
     def run(self) -> None:
@@ -390,7 +390,7 @@ class LoopSolver:
             self._plain()
 
     def held(self, x: Node) -> list[Node]:
-        """Unknowns that an equation changes with."""
+        """Unknowns that an equation depends on."""
         return [w for w in self.unknowns if self._depends(x, w)]
 
     def _depends(self, x: Node, w: Node) -> bool:
@@ -400,18 +400,18 @@ class LoopSolver:
         return self._changes[key]
 
     def _plain(self) -> None:
-        """Take unknowns out of equations that do not change with them."""
+        """Remove unknowns from equations that do not depend on them."""
         for k, x in enumerate(self.equations):
             none = [w for w in self.unknowns if contains_symbol(x, w) and not self._depends(x, w)]
             if none:
                 self.equations[k] = x.graph.node(substitute([x], [(w, 0.0) for w in none])[0])
 
     def _slope(self, x: Node, w: Node) -> Any:
-        """What stands before an unknown that stands linearly."""
+        """Coefficient of an unknown that occurs linearly."""
         slope = self.probe.simplest(directional_derivatives([x], [(w, 1.0)])[0])
         return substitute([slope], [(y, 0.0) for y in self.unknowns])[0] if isinstance(slope, Node) else slope
 
-    # -- rules: each says whether it did something
+    # -- rules: each returns whether it changed something
 
     def _one(self) -> bool:
         for x in self.equations:
@@ -425,7 +425,7 @@ class LoopSolver:
         return False
 
     def _linear_in_two(self) -> bool:
-        """A slide along a direction that is known but moves: each of two equations alone may fail to tell it."""
+        """Solve for a slide along a known moving direction from two equations; one alone may be singular."""
         for w in self.unknowns:
             holding = [x for x in self.equations if self._depends(x, w)]
             if len(holding) != 2 or not all(self._linearly(x, w) for x in holding):
@@ -440,7 +440,7 @@ class LoopSolver:
         return False
 
     def _linear(self) -> bool:
-        """An unknown that stands linearly, with a factor that does not move rather than with one that does."""
+        """Solve for an unknown that occurs linearly, preferably with a constant coefficient."""
         for moving in (False, True):
             for w, x in itertools.product(self.unknowns, self.equations):
                 if not self._depends(x, w) or not self._linearly(x, w):
@@ -454,16 +454,16 @@ class LoopSolver:
         return False
 
     def _linearly(self, x: Node, w: Node) -> bool:
-        """Whether w stands linearly, with a factor that nothing unknown changes."""
+        """Whether w occurs linearly, with a coefficient that does not depend on unknowns."""
         slope = directional_derivatives([x], [(w, 1.0)])[0]
         return not isinstance(slope, Node) or not any(self._depends(slope, y) for y in self.unknowns)
 
     def _follow(self) -> bool:
-        """Angles that follow one another: E_vw = E_ww says that E knows w only in v + w."""
+        """Combine successive angles: if E_vw = E_ww, the equation E depends on w only through v + w."""
         return self._follows(itertools.permutations(self.unknowns, 2))
 
     def _follow_known(self) -> bool:
-        """The same after a known angle: the sum is an angle from ground, which has the shorter formula."""
+        """Combine an angle with a known one: the sum is an angle from ground, with a shorter formula."""
         return self._follows(itertools.product(reversed(self.known), self.unknowns))
 
     def _follows(self, pairs: Iterable[tuple[Node, Node]]) -> bool:
@@ -480,7 +480,7 @@ class LoopSolver:
         return False
 
     def _bends(self, x: Node, v: Node, w: Node) -> tuple[Any, bool]:
-        """Second derivative of an equation by two unknowns, and whether it is something."""
+        """Second derivative of an equation by two unknowns, and whether it is nonzero."""
         a, b = (v, w) if v.index < w.index else (w, v)
         key = x.index, a.index, b.index
         if key not in self._bent:
@@ -498,7 +498,7 @@ class LoopSolver:
         return f"({v.data.name} + {w.data.name})" if sign > 0 else f"({w.data.name} - {v.data.name})"
 
     def _counted(self, v: Node, w: Node, sign: float) -> None:
-        """Put v + w (or w - v) in place of w."""
+        """Substitute v + w (or w - v) for w."""
         g = w.graph
         name = self._name(v, w, sign)
         self._substituted_sums.add(name)
@@ -541,24 +541,25 @@ class LoopSolver:
         self.unknowns.remove(w)
 
 
-SAMPLE_COUNT = 1441  # on two turns
-MAX_JUMP = 0.98 * math.pi  # from the middle of what an angle does beside its turns, where these can be told
+SAMPLE_COUNT = 1441  # on two revolutions
+# Largest deviation of an angle from its mean, apart from its revolutions, that counts as continuous.
+MAX_JUMP = 0.98 * math.pi
 FULL_TURN = 2.0 * math.pi
 
 
 def follow_whole_turns(
     definitions: Sequence[Definition], known: Sequence[Node], start: Mapping[str, float]
 ) -> list[Definition]:
-    """The same, with angles that jump followed.
+    """Add whole turns to formulas of angles that jump.
 
     Parameters
     ----------
     definitions : sequence of Definition
-        In an order of evaluation.
+        Definitions in an order of evaluation.
     known : sequence of Node
-        Coordinates that are given.
+        Given coordinates.
     start : mapping
-        Numbers of all symbols in the drawn position.
+        Values of all symbols in the reference configuration.
     """
     values: dict[str, Any] = dict(start)
     if len(known) == 1:
@@ -572,7 +573,8 @@ def follow_whole_turns(
     out: list[Definition] = []
     for d in definitions:
         if not d.closed:
-            return [*out, *definitions[len(out) :]]  # what stands on what has no formula is not followed
+            # Definitions that depend on implicit ones are not processed.
+            return [*out, *definitions[len(out) :]]
         new = []
         for w, y in zip(d.symbols, d.values, strict=True):
             with np.errstate(all="ignore"):
@@ -587,7 +589,7 @@ def follow_whole_turns(
 
 
 def _is_angle(y: Any) -> bool:
-    """Whether an arctangent is added up in a formula."""
+    """Whether a formula is a sum with an arctangent."""
     if not isinstance(y, Node):
         return False
     return y.op == "atan2" or (y.op in ("add", "multiply") and any(_is_angle(z) for z in y.args))
@@ -596,7 +598,7 @@ def _is_angle(y: Any) -> bool:
 def _followed_angle(
     what: tuple[Node, Any, np.ndarray], known: Sequence[Node], way: np.ndarray, start: Mapping[str, float]
 ) -> tuple[Any, np.ndarray]:
-    """The formula with whole turns, if it needs some, and its values."""
+    """The formula with whole turns added where needed, and its values."""
     w, y, found = what
     drawn = start[w.data.name]
     if len(known) != 1:
@@ -626,7 +628,7 @@ def _followed_angle(
 
 
 def _range(found: np.ndarray) -> tuple[int, int]:
-    """The range about the middle in which the mechanism closes."""
+    """Range around the middle in which the mechanism can be assembled."""
     middle = len(found) // 2
     gone = np.flatnonzero(~np.isfinite(found))
     before, behind = gone[gone < middle], gone[gone > middle]

@@ -34,7 +34,7 @@ class Constraints:
     Attributes
     ----------
     elements : list of str
-        Whose each is.
+        Element of each constraint.
     holonomic : ndarray of bool
         Which are constraints on positions.
     """
@@ -48,9 +48,9 @@ class Constraints:
 
 
 def collect_constraints(x: TracedEquations) -> Constraints:
-    """Rows first, in the order of the multipliers, then prescribed coordinates."""
+    """Collect constraints: rows in the order of the multipliers, then prescribed coordinates."""
     s, S, W = x.structure, x.system, x.work
-    there = len(x.g) > len(s.rows)  # prescribed coordinates are among the rows already
+    there = len(x.g) > len(s.rows)  # prescribed coordinates are already among the rows
     n = 0 if there else len(s.prescribed)
     later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
     G, g, nu, gamma = zero_objects(n, s.nv), zero_objects(n), zero_objects(n), zero_objects(n)
@@ -70,26 +70,26 @@ def collect_constraints(x: TracedEquations) -> Constraints:
     )
 
 
-DEPENDENCE_TOLERANCE = 1e-8  # part of the largest by which an independent coordinate must move
+DEPENDENCE_TOLERANCE = 1e-8  # smallest motion of an independent coordinate, relative to the largest
 
 
 @dataclass(frozen=True)
 class Partition:
-    """What constraints leave free, as numbers at one position.
+    """Partition of the coordinates at one position.
 
     Attributes
     ----------
     chosen : list of int
         Independent velocities.
     rows : list of int
-        As many of the constraints as are independent.
+        A set of independent constraints.
     """
 
     chosen: list[int]
     rows: list[int]
 
     def dependent(self, nv: int) -> list[int]:
-        """The other velocities."""
+        """Indices of the dependent velocities."""
         return [d for d in range(nv) if d not in self.chosen]
 
 
@@ -103,16 +103,16 @@ def choose_independent(
     G : ndarray (nr, nv)
         Jacobian at one position.
     scale : ndarray (nv,)
-        A large step along each velocity.
+        Natural step size along each velocity.
     requested : sequence of int
-        Velocities that must be among them.
+        Velocities that must be independent.
     only : bool
-        Whether no others may be.
+        Whether only these may be independent.
 
     Raises
     ------
     ValueError
-        With the velocity that cannot be independent of those before it.
+        With the index of a velocity that depends on the ones before it.
     """
     from scipy.linalg import qr
 
@@ -141,12 +141,12 @@ def choose_independent(
 
 
 def velocities_by_name(names: Sequence[str], requested: Sequence[str], model: str) -> list[int]:
-    """Velocities by name.
+    """Indices of velocities by name.
 
     Raises
     ------
     ModelError
-        If there is no such coordinate; the message lists what there is.
+        If there is no such coordinate; the message lists all coordinates.
     """
     at = {n: k for k, n in enumerate(names)}
     for n in requested:
@@ -159,7 +159,7 @@ def velocities_by_name(names: Sequence[str], requested: Sequence[str], model: st
 
 
 def position_groups(s: Structure) -> list[tuple[list[int], list[int]]]:
-    """Coordinates that belong together and their velocities: one and one, or a quaternion and its turns."""
+    """Groups of coordinates and their velocities: one and one, or a quaternion and its angular velocities."""
     out = []
     tree = s.tables["tree"]
     for q, v, nq, nv in zip(*(x.tolist() for x in (tree.q, tree.v, tree.nq, tree.nv)), strict=True):
@@ -171,7 +171,7 @@ def position_groups(s: Structure) -> list[tuple[list[int], list[int]]]:
 
 
 def singular_start_error(names: Sequence[str], t: float) -> SingularityError:
-    """The error of a start where the constraints lose rank."""
+    """The error for an initial position where the constraints lose rank."""
     return SingularityError(
         f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} depend on "
         "each other here and not nearby, so that coordinates cannot be told apart; draw it away from there",
@@ -181,21 +181,22 @@ def singular_start_error(names: Sequence[str], t: float) -> SingularityError:
 
 
 NEARBY_STEP = (
-    1e-2  # part of a radian, or of the mechanism's length, that it is moved by to see whether its rank is the usual
+    # Distance [rad, or relative to the mechanism's length] of the nearby position whose rank is compared.
+    1e-2
 )
 MAX_ITERATIONS = 20
-CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+CLOSURE_TOLERANCE = 1e-10  # relative to the mechanism's length
 
 
 class ConstraintValues:
-    """Numbers at the start.
+    """Values of the constraints at and near the initial position.
 
     Parameters
     ----------
-    x : Traced
+    x : TracedEquations
     c : Constraints
     start : mapping
-        Numbers of time, coordinates and velocities by the names of their symbols; others are zero.
+        Values of time, coordinates and velocities by symbol name; others are zero.
     """
 
     def __init__(self, x: TracedEquations, c: Constraints, start: Mapping[str, float]) -> None:
@@ -210,19 +211,19 @@ class ConstraintValues:
         self.G = self.jacobian(self.values)
 
     def jacobian(self, values: Mapping[str, float]) -> np.ndarray:
-        """G there, with plain zeros for rounding."""
+        """Jacobian G at these values; entries within rounding are 0."""
         G = np.array(evaluate_array(self.c.G, values), float).reshape(self.c.G.shape)
         size = np.abs(G * self.scale).max(axis=1, initial=0.0, keepdims=True)
         G[np.abs(G * self.scale) <= 1e-13 * size] = 0.0
         return G
 
     def refuse_singular(self, f: Partition) -> None:
-        """Refuse a start where the constraints lose rank.
+        """Refuse an initial position where the constraints lose rank.
 
         Raises
         ------
         SingularityError
-            Naming the elements whose constraints depend on one another here and not nearby.
+            With the names of the elements whose constraints are dependent here and independent nearby.
         """
         which = np.flatnonzero(self.c.holonomic)
         if not f.chosen or not len(which):
@@ -235,7 +236,7 @@ class ConstraintValues:
                 raise singular_start_error(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
 
     def _nearby(self, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
-        """Constraints on positions at the closed position near a random step away; None if none is found."""
+        """Jacobian of the position constraints at the assembled position near a random step; None if assembly fails."""
         null = null_space(normalised_rows(self.G[which], self.scale))
         a = null @ rng.standard_normal(null.shape[1])
         step = NEARBY_STEP * self.scale * self.length * a / np.abs(a).max()
@@ -250,7 +251,7 @@ class ConstraintValues:
         return None
 
     def _moved(self, values: dict[str, float], step: np.ndarray) -> None:
-        """Coordinates moved along the velocities; quaternions of unit length."""
+        """Move the coordinates along the velocities and normalise quaternions."""
         T = np.array(evaluate_array(self.x.T, values), float).reshape(self.x.T.shape)
         dq = T @ step
         names = [s.data.name for s in self.x.q]
@@ -261,7 +262,7 @@ class ConstraintValues:
             values |= {names[k]: float(y) for k, y in zip(q, moved, strict=True)}
 
     def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
-        """Elements whose rows take part in dependencies that are not there nearby."""
+        """Elements whose rows take part in dependencies that nearby positions do not have."""
         y, span = (
             fundamental_subspaces(normalised_rows(here, self.scale)).dependencies,
             fundamental_subspaces(normalised_rows(there, self.scale)).span,

@@ -1,8 +1,7 @@
-"""What defines dependent quantities: formulas, or equations that Newton's method solves.
+"""Definitions of dependent quantities: formulas, or equations that Newton's method solves.
 
-The path from the last position is subdivided where Newton's method does not follow it, and the sign of the
-Jacobian's determinant is preserved: where it changes, the branch ends (a dead centre), and no other branch is
-taken.
+The path from the last position is subdivided where Newton's method does not converge. The sign of the Jacobian's
+determinant must not change: where it does, the branch ends (a dead centre), and no other branch is taken.
 """
 
 from __future__ import annotations
@@ -21,19 +20,19 @@ from .linear_systems import Determinants, solve_blocks, sparse_product
 
 @dataclass(frozen=True)
 class Definition:
-    """Symbols, and what they are in terms of symbols that are known before.
+    """Definition of symbols in terms of symbols that are known before.
 
     Attributes
     ----------
     symbols : tuple of Node
     values : tuple of Node
-        Formulas; empty where there are none, and ``residuals`` determine the symbols.
+        Formulas; if empty, ``residuals`` determine the symbols.
     residuals : tuple of Node
-        What vanishes; as many as symbols.
+        Expressions that vanish; as many as symbols.
     how : str
-        How the formula was found, and which branch of it is taken.
+        Form of the equation, and the branch.
     radius : Node or number, optional
-        sqrt(x^2 + y^2) of a formula atan2(y, x), where that is known.
+        sqrt(x^2 + y^2) of a formula atan2(y, x), if known.
     """
 
     symbols: tuple[Node, ...]
@@ -49,22 +48,22 @@ class Definition:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What it defines."""
+        """Names of the defined symbols."""
         return tuple(x.data.name for x in self.symbols)
 
 
 class FormulaSubstitution:
-    """Expressions with formulas put in for symbols that have some; each expression of the graph is seen once.
+    """Substitutes formulas for symbols in expressions; each node of the graph is processed once.
 
     Parameters
     ----------
     definitions : sequence of Definition
-        Each stands on those before.
+        Each depends on earlier ones only.
 
     Attributes
     ----------
     implicit : list of Definition
-        Those without formulas, their equations with all formulas put in.
+        Definitions without formulas, with all formulas substituted in their equations.
     """
 
     def __init__(self, definitions: Sequence[Definition]) -> None:
@@ -79,7 +78,7 @@ class FormulaSubstitution:
                 self.implicit.append(Definition(d.symbols, (), tuple(gaps), d.how))
 
     def __call__(self, nodes: Sequence[Any]) -> list[Any]:
-        """Expressions in which no symbol with a formula is left."""
+        """Substitute all symbols that have a formula."""
         for x in new_nodes(nodes, self._known):
             args = tuple(self._known[a.index] for a in x.args)
             same = all(a is b for a, b in zip(args, x.args, strict=True))
@@ -88,7 +87,7 @@ class FormulaSubstitution:
 
 
 def new_nodes(nodes: Sequence[Any], known: Mapping[int, Any]) -> list[Node]:
-    """What expressions are made of and is not known, in an order of evaluation."""
+    """Nodes of expressions that are not in ``known``, in an order of evaluation."""
     found: dict[int, Node] = {}
     to_see = [x for x in nodes if isinstance(x, Node)]
     while to_see:
@@ -107,7 +106,7 @@ def implicit_rates(
     Parameters
     ----------
     definitions : sequence of Definition
-        All without formulas: see `FormulaSubstitution`.
+        Definitions without formulas: see `FormulaSubstitution`.
     by : sequence of Node
         Symbols.
 
@@ -128,18 +127,18 @@ def implicit_rates(
 
 MAX_STEPS = 30
 CLOSURE_TOLERANCE = 1e-13  # change of the unknowns, relative to their size
-NEAR_SOLUTION = 0.5  # rad or m: a longer step of the unknowns is cut
-SHORTEST_STEP = 1e-6  # part of the way
+NEAR_SOLUTION = 0.5  # longest step of the unknowns [rad or m]
+SHORTEST_STEP = 1e-6  # relative to the path
 
 
 class ImplicitSolver:
-    """Unknowns of one definition as a function of what its equations hold.
+    """Newton solver for the unknowns of one definition as functions of its other symbols.
 
     Parameters
     ----------
     definition : Definition
     start : mapping
-        Numbers of all symbols where the branch is known.
+        Values of all symbols at a known point of the branch.
     """
 
     def __init__(self, definition: Definition, start: Mapping[str, float]) -> None:
@@ -158,12 +157,12 @@ class ImplicitSolver:
         self._first = self._at, self._w
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, float]:
-        """Their values.
+        """Values of the unknowns.
 
         Raises
         ------
         SingularityError
-            If the branch ends before.
+            If the branch ends on the way.
         """
         there = {n: float(values.get(n, self._own.get(n, 0.0))) for n in self._given}
         w = self._follow(there, self._at, self._w)
@@ -214,6 +213,6 @@ class ImplicitSolver:
 
 
 def unknown_symbols(nodes: Sequence[Any], definitions: Sequence[Definition]) -> list[Node]:
-    """Symbols of these definitions that expressions hold."""
+    """Symbols of these definitions that occur in expressions."""
     held = {x.index for x in symbols_of(nodes)}
     return [w for d in definitions for w in d.symbols if w.index in held]

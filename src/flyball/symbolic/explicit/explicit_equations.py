@@ -32,13 +32,15 @@ if TYPE_CHECKING:
     from ..equations import Equations
 
 
-MAX_READ = 300  # operations up to which all is put in the independent coordinates
-SHORT_COUNT = 40.0  # symbols up to which a coordinate is, though its formula by others is shorter
+# Up to so many operations everything is expressed in the independent coordinates.
+MAX_READ = 300
+# A coordinate is, up to so many symbols, even if its formula by others is shorter.
+SHORT_COUNT = 40.0
 Row = tuple[str, Any]
 
 
 def report(x: ExplicitEquations) -> str:
-    """The equations as text, no longer than can be read."""
+    """The equations as text of readable length."""
     s, units = x.solution, x.equations.units
     free = ", ".join(x.independent)
     lines = [
@@ -73,7 +75,7 @@ def report(x: ExplicitEquations) -> str:
 
 
 def form_description(how: str) -> str:
-    """The form of an equation, without letters that stand for nothing here."""
+    """Form of an equation as text, without letters that are not defined here."""
     how = re.sub(r"A cos w \+ B sin w \+ C = 0, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
     how = how.replace("A cos w + B sin w = 0", "the drawn one of two opposite directions")
     return re.sub(r"quadratic, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
@@ -85,13 +87,13 @@ def definition_pairs(d: Definition) -> list[tuple[Node, Any]]:
 
 
 def upper_triangle(names: Sequence[str]) -> list[tuple[tuple[int, str], tuple[int, str]]]:
-    """Places of a symmetric matrix, each once."""
+    """Index pairs of the upper triangle of a symmetric matrix, with names."""
     told = list(enumerate(names))
     return [(a, b) for a in told for b in told if a[0] <= b[0]]
 
 
 def coordinate_formulas(definitions: Sequence[Definition], algebra: ArctangentSubstitution) -> list[Row]:
-    """Formulas of dependent coordinates: by the independent ones where that is short, else by others before them."""
+    """Formulas of dependent coordinates: by the independent ones if short, else by others before them."""
     out = []
     for w, y in (pair for d in definitions if d.closed for pair in definition_pairs(d)):
         y = without_whole_turns(w.graph.node(y))
@@ -102,14 +104,14 @@ def coordinate_formulas(definitions: Sequence[Definition], algebra: ArctangentSu
 
 
 def substituted_rows(rows: Sequence[Row], algebra: ArctangentSubstitution) -> list[Row]:
-    """The same in the independent coordinates."""
+    """The rows expressed in the independent coordinates."""
     return list(zip([name for name, _ in rows], algebra([y for _, y in rows]), strict=True))
 
 
 def with_rate_formulas(
     rows: Sequence[Row], definitions: Sequence[Definition], places: Sequence[Definition]
 ) -> list[Row]:
-    """The same by dependent coordinates and their rates, after formulas of the rates that they hold."""
+    """The rows in dependent coordinates and their rates, preceded by formulas of the rates that occur."""
     by = {w.index: (w, y) for d in definitions[len(places) :] if d.closed for w, y in definition_pairs(d)}
     wanted: dict[int, Row] = {}
     to_see = [y for _, y in rows]
@@ -123,7 +125,7 @@ def with_rate_formulas(
 
 
 def shorter_listing(alternatives: Sequence[Sequence[Row]], units: Sequence[Sequence[Node]]) -> list[str]:
-    """The first way in lines if it is small, else the shorter of both; nothing if none can be read."""
+    """Lines of the first alternative if it is small, else of the shorter one; none if all are too long."""
     first, second = ([y for _, y in rows] for rows in alternatives)
     lines = [formula_lines(alternatives[0], units)] if node_count(first) <= MAX_READ else []
     if not (lines and lines[0]) or sum(map(len, lines[0])) > 2500 or node_count(second) < node_count(first) / 2:
@@ -131,32 +133,32 @@ def shorter_listing(alternatives: Sequence[Sequence[Row]], units: Sequence[Seque
     return min((x for x in lines if x), key=lambda x: sum(map(len, x)), default=[])
 
 
-INPUT_THRESHOLD = 1e-8  # part by which something may change with multipliers that act on nothing
+INPUT_THRESHOLD = 1e-8  # relative change by undetermined multipliers that counts as none
 
 
 class ExplicitEquations:
     """Equations of motion without constraints and multipliers, M a = f, by coordinate partitioning.
 
-    The independent coordinates u determine the others, w: by formulas where loops close in closed form, in the mode of
-    assembly that is drawn; else by their equations, which Newton's method solves. Velocities and accelerations of the
-    others follow from the constraints' derivatives (Wehage and Haug 1982), exactly.
+    The independent coordinates u determine the others, w: by formulas where loops close in closed form, in the
+    assembly mode of the reference configuration; else by equations, which Newton's method solves. Velocities and
+    accelerations of the others follow exactly from the constraints' derivatives (Wehage and Haug 1982).
 
         M a = f,   M = Z^T M Z,   f = Z^T (f - M b),   v = Z u' + b',   v' = Z a + b
 
     Attributes
     ----------
     equations : Equations
-        Those with constraints.
+        The equations with constraints.
     independent : tuple of str
         Independent coordinates.
     dependent : tuple of str
-        Those that have a formula, in the order in which they are found: each may hold those before it.
+        Coordinates with a formula, in the order in which they are found: each may contain earlier ones.
     implicit : tuple of str
-        Coordinates (and loads of joints with friction) that have none.
+        Coordinates (and loads of joints with friction) without a formula.
     notes : tuple of str
-        Why they have none.
+        Reasons why they have none.
     branches : dict
-        From each dependent coordinate to the form of its equation and the branch that is taken.
+        Dependent coordinate -> form of its equation, and the branch.
     """
 
     def __init__(self, equations: Equations, solution: ReducedEquations, inputs: dict[str, Node]) -> None:
@@ -188,16 +190,16 @@ class ExplicitEquations:
 
     @property
     def Z(self) -> Expressions:
-        """What the velocities change with the independent ones: v = Z u' + what drivers do."""
+        """Derivatives of the velocities by the independent ones: v = Z u' + terms of drivers."""
         return self._told(self.solution.Z, self.solution.names, self.independent)
 
     @property
     def accelerations(self) -> Expressions:
-        """Of the independent coordinates, solved for in straight-line code (L D L^T)."""
+        """Accelerations of the independent coordinates, in straight-line code (L D L^T)."""
         return self._told(self.solution.accelerations[self.solution.chosen], self.independent)
 
     def formula(self, coordinate: str) -> Expressions:
-        """A dependent coordinate as it is found: it may hold others that are found before.
+        """Formula of a dependent coordinate; it may contain coordinates found before.
 
         Raises
         ------
@@ -215,7 +217,7 @@ class ExplicitEquations:
         raise ModelError(f"there is no dependent coordinate {coordinate!r}{suggest(coordinate, known)}")
 
     def conditions(self, coordinate: str) -> Expressions:
-        """What vanishes where an implicit coordinate is right: the equations that it shares with others.
+        """Equations of an implicit coordinate, which it shares with others.
 
         Raises
         ------
@@ -229,16 +231,16 @@ class ExplicitEquations:
 
     @property
     def determinants(self) -> dict[str, Expressions]:
-        """What must not vanish, by what it determines: where it does, the partition is singular."""
+        """Determinants by the coordinates they determine; where one vanishes, the partition is singular."""
         return {k: self._told(x) for k, x in self.solution.determinants.items()}
 
     def __getitem__(self, name: str) -> Expressions:
-        """Anything that a result has, in the independent coordinates, their rates, and what has no formula.
+        """A quantity of a result, in the independent coordinates, their rates, and implicit coordinates.
 
         Raises
         ------
         ModelError
-            If there is nothing of that name, or redundant constraints leave it undetermined.
+            If the name is unknown, or redundant constraints leave the quantity undetermined.
         """
         found = self.equations[name]
         self._refuse_undetermined(name, found)
@@ -257,7 +259,7 @@ class ExplicitEquations:
         values = place.values | {a.data.name: 0.0 for a in self.equations.named_equations.vdot}
         lam = s.traced.lam
         slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
-        slope = gap_lengths(slope.T, place.G[: len(lam)], place.scale).T  # by multipliers of rows of unit size
+        slope = gap_lengths(slope.T, place.G[: len(lam)], place.scale).T  # by multipliers of unit rows
         among = np.abs(y[: len(lam)].T @ slope)
         if (among > INPUT_THRESHOLD * np.abs(slope).max(initial=0.0)).any():
             raise ModelError(
@@ -281,7 +283,7 @@ class ExplicitEquations:
 def explicit_equations(
     equations: Equations, independent: Sequence[str] = (), closed: bool = False
 ) -> ExplicitEquations:
-    """Take constraints and multipliers out: see `Equations.explicit`."""
+    """Eliminate constraints and multipliers: see `Equations.explicit`."""
     eq, x = equations, equations.named_equations
     traced, inputs = with_input_rates(eq)
     places = [(p.symbol, p.equation) for p in x.places]
@@ -297,7 +299,7 @@ def explicit_equations(
 
 
 def with_input_rates(eq: Equations) -> tuple[TracedEquations, dict[str, Node]]:
-    """Equations in which inputs that move drivers have rates, and all inputs by name.
+    """Equations in which inputs that move drivers have symbols for their rates, and all inputs by name.
 
     Raises
     ------

@@ -27,12 +27,12 @@ def solution_blocks(pattern: np.ndarray) -> list[Block] | None:
     Parameters
     ----------
     pattern : ndarray of bool (n, n)
-        Whether an unknown (column) stands in an equation (row).
+        Whether an unknown (column) occurs in an equation (row).
 
     Returns
     -------
     list of (rows, columns) or None
-        None where the pattern alone makes the equations singular.
+        None if the equations are singular by their pattern.
     """
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
@@ -43,7 +43,7 @@ def solution_blocks(pattern: np.ndarray) -> list[Block] | None:
     match = maximum_bipartite_matching(sp.csr_matrix(pattern), perm_type="column")  # row -> column
     if (match < 0).any():
         return None
-    moved = pattern[:, match]  # unknown k is now the one that equation k is solved for
+    moved = pattern[:, match]  # equation k is now solved for unknown k
     count, label = connected_components(sp.csr_matrix(moved), directed=True, connection="strong")
     rows = [np.flatnonzero(label == k).tolist() for k in range(count)]
     needs = [{int(label[j]) for r in rows[k] for j in np.flatnonzero(moved[r])} - {k} for k in range(count)]
@@ -51,7 +51,7 @@ def solution_blocks(pattern: np.ndarray) -> list[Block] | None:
 
 
 def _in_order(needs: Sequence[set[int]], first: Sequence[int]) -> list[int]:
-    """Each after those that it needs; else by their first unknowns."""
+    """Order in which each block follows those it needs, else by their first unknowns."""
     done: list[int] = []
     left = sorted(range(len(needs)), key=lambda k: first[k])
     while left:
@@ -61,36 +61,36 @@ def _in_order(needs: Sequence[set[int]], first: Sequence[int]) -> list[int]:
     return done
 
 
-MAX_CRAMER = 3  # unknowns up to which determinants are written out
+MAX_CRAMER = 3  # largest block solved by Cramer's rule
 
 
 @dataclass
 class Determinants:
-    """What must not vanish: (which unknowns, expression)."""
+    """Determinants that must not vanish: (indices of unknowns, expression)."""
 
     found: list[tuple[tuple[int, ...], Any]] = field(default_factory=list)
 
     def add(self, columns: list[int], value: Any) -> None:
-        """Another one; plain numbers are none."""
+        """Add one; plain numbers are ignored."""
         if not getattr(value, "known", True):
             self.found.append((tuple(columns), value))
 
 
 def nonzero_pattern(A: np.ndarray) -> np.ndarray:
-    """Which entries are no zeros."""
+    """Which entries are not zero."""
     return np.array([[x != 0.0 for x in row] for row in A], bool).reshape(A.shape)
 
 
 def solve_blocks(A: np.ndarray, B: np.ndarray, dets: Determinants, order: list[Block] | None = None) -> np.ndarray:
-    """X with A X = B.
+    """Solve A X = B.
 
     Parameters
     ----------
     A, B : ndarray of Node (n, n), (n, m)
     dets : Determinants
-        Those of the blocks are added.
+        The determinants of the blocks are added.
     order : list of Block, optional
-        The blocks of A; found here if not given.
+        Blocks of A; computed if not given.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def transposed_blocks(order: list[Block]) -> list[Block]:
 
 
 def sparse_product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """A B, zeros dropped."""
+    """Product A B, skipping zeros."""
     out = zero_objects(len(A), *B.shape[1:])
     for i, row in enumerate(A):
         for k, a in enumerate(row):
@@ -177,7 +177,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> Any:
 
 
 def solve_symmetric(M: np.ndarray, B: np.ndarray, pivots: Determinants) -> np.ndarray:
-    """X with M X = B by M = L D L^T, for a positive definite M; the pivots are added."""
+    """Solve M X = B by M = L D L^T for a positive definite M; the pivots are added to ``pivots``."""
     n = len(M)
     L, D = zero_objects(n, n), zero_objects(n)
     for k in range(n):

@@ -47,8 +47,9 @@ from .linear_systems import (
 )
 from .zero_test import Probe
 
-AGREEMENT_TOLERANCE = 1e-9  # part of what is added up in an equation, by which formulas may miss it
-RANDOM_STEP = 0.02  # part of a radian or metre by which that is tried
+# Residual of formulas in the equations that counts as zero, relative to the terms.
+AGREEMENT_TOLERANCE = 1e-9
+RANDOM_STEP = 0.02  # random steps [rad or m] of the positions where this is tested
 TRIALS = 6
 
 
@@ -59,11 +60,11 @@ class SolvedPositions:
     Attributes
     ----------
     definitions : list of Definition
-        In an order in which each stands on those before.
+        Definitions in an order in which each depends on earlier ones only.
     never : list of (name, Node)
-        What must not vanish, or become negative, for a formula to hold.
+        Expressions that must not vanish, or become negative, for a formula to be valid.
     notes : list of str
-        Why there are coordinates without formulas, in words.
+        Reasons why coordinates have no formula.
     """
 
     definitions: list[Definition]
@@ -77,16 +78,16 @@ def solve_positions(
     what: tuple[list[int], list[int]],
     places: Sequence[tuple[Node, Any]] = (),
 ) -> SolvedPositions:
-    """Definitions of dependent coordinates.
+    """Find definitions of dependent coordinates.
 
     Parameters
     ----------
-    x : Traced
-    place : Place
+    x : TracedEquations
+    place : ConstraintValues
     what : (list of int, list of int)
-        Constraints, and the coordinates q that they determine; what makes quaternions units is added.
+        Constraints, and the coordinates q that they determine; unit norms of quaternions are added.
     places : sequence of (Node, Node)
-        Places on curves, and what vanishes there.
+        Curve parameters, and their equations.
     """
     (rows, unknown), c = what, place.c
     g = [x.graph.node(y) for y in c.g[rows]]
@@ -115,13 +116,13 @@ def solve_positions(
 
 
 def _given(x: TracedEquations, unknown: Sequence[int]) -> list[Node]:
-    """Coordinates that are not asked for; where drivers move all, the coordinate that a driver gives."""
+    """Coordinates that are given; if drivers move all, the coordinate of a driver."""
     known = [s for k, s in enumerate(x.q) if k not in unknown]
     return known or [x.q[x.system.tree.q[b]] for b in x.structure.prescribed.values()]
 
 
 def _implicit(g: Sequence[Node], w: Sequence[Node], probe: Probe) -> list[Definition]:
-    """Blocks that Newton's method solves."""
+    """Blocks of equations for Newton's method."""
     J = probe.cleaned(jacobian(g, w))
     order = solution_blocks(nonzero_pattern(J)) if len(w) else []
     if order is None:
@@ -138,7 +139,7 @@ def _reason(d: Definition, elements: Sequence[str]) -> str:
 
 
 def _with_reference_turns(d: Definition, probe: Probe) -> Definition | None:
-    """The same with the whole turns that the drawn position has; None if the formula is not true there."""
+    """Add the whole turns of the reference configuration; None if the formula does not hold there."""
     values = []
     for w, y in zip(d.symbols, d.values, strict=False):
         missing = probe.start[w.data.name] - probe.at_start(y)
@@ -150,9 +151,9 @@ def _with_reference_turns(d: Definition, probe: Probe) -> Definition | None:
 
 
 def _fulfil_equations(g: Sequence[Node], definitions: Sequence[Definition], place: ConstraintValues) -> bool:
-    """Whether formulas fulfil the equations at random positions near the drawn one."""
+    """Whether formulas fulfil the equations at random positions near the reference configuration."""
     others = {w.data.name for d in definitions if not d.closed for w in d.symbols}
-    if others:  # where equations are left, these are tested by themselves
+    if others:  # remaining equations are tested separately
         return True
     if not definitions:
         return True
@@ -173,14 +174,14 @@ def _fulfil_equations(g: Sequence[Node], definitions: Sequence[Definition], plac
 
 @dataclass(frozen=True)
 class ExtraSymbols:
-    """What equations may hold besides coordinates, velocities and multipliers.
+    """Symbols of equations other than coordinates, velocities and multipliers.
 
     Attributes
     ----------
     vdot : list of Node
         Symbols of the accelerations.
     places : list of (Node, Node)
-        Symbols of places on curves, and what vanishes there.
+        Symbols of curve parameters, and their equations.
     """
 
     vdot: Sequence[Node] = ()
@@ -197,17 +198,17 @@ class ReducedEquations:
     Attributes
     ----------
     names : tuple of str
-        Velocities, by the coordinates that they are rates of.
+        Names of velocities: those of the coordinates whose rates they are.
     known : list of int
-        Which coordinates q are given: the independent ones; of quaternions all four.
+        Indices of the given coordinates q: the independent ones; of quaternions all four.
     chosen : list of int
-        Which velocities v are independent.
+        Indices of the independent velocities v.
     definitions : list of Definition
-        Dependent coordinates, velocities, accelerations, multipliers and loads of joints, each from what stands before.
+        Dependent coordinates, velocities, accelerations, multipliers and joint loads, each from earlier ones.
     M, f : ndarray of Node (n, n), (n,)
-        Reduced: M a = f, a the accelerations of the independent coordinates.
+        Reduced equations M a = f with the accelerations a of the independent coordinates.
     accelerations : ndarray of Node (nv,)
-        Symbols-free where all coordinates have formulas.
+        All accelerations; free of dependent symbols if all coordinates have formulas.
     """
 
     traced: TracedEquations
@@ -235,7 +236,7 @@ class ReducedEquations:
 
     @cached_property
     def formulas(self) -> FormulaSubstitution:
-        """Puts in all formulas."""
+        """Substitution of all formulas."""
         return FormulaSubstitution(self.definitions)
 
     def __repr__(self) -> str:
@@ -256,14 +257,14 @@ def reduce_equations(
 
     Parameters
     ----------
-    x : Traced
+    x : TracedEquations
     start : mapping
-        An assembled position, as numbers of t, q and v by the names of their symbols: it tells the branch of every
+        An assembled position: values of t, q and v by symbol name. It determines the branch of every
         dependent coordinate.
     independent : sequence of str
         Coordinates such as ``"A.angle"``; chosen by pivoting at the start if none are named.
-    more : More
-        What the equations hold besides.
+    more : ExtraSymbols
+        Further symbols of the equations.
 
     Raises
     ------
@@ -275,7 +276,7 @@ def reduce_equations(
     c = collect_constraints(x)
     place = ConstraintValues(x, c, start)
     names = tuple(v.data.name.removesuffix("'") for v in x.v)
-    if x.v and not x.v[0].data.element:  # symbols that are called by their numbers
+    if x.v and not x.v[0].data.element:  # numbered symbols
         names = tuple(n.name for n in velocity_names(x.structure))
     chosen, rows = _chosen(x, place, names, independent)
     known, holonomic, unknown = _positions(x, place, chosen)
@@ -319,7 +320,7 @@ def _chosen(
 def _positions(
     x: TracedEquations, place: ConstraintValues, chosen: list[int]
 ) -> tuple[list[int], list[int], list[int]]:
-    """Coordinates that are given; constraints that determine the others; those others."""
+    """Given coordinates, constraints that determine the others, and these others."""
     which = np.flatnonzero(place.c.holonomic)
     free_places = set(choose_independent(place.G[which], place.scale, chosen).chosen)
     known: list[int] = []
@@ -338,7 +339,7 @@ def _positions(
 
 @dataclass
 class _Reduction:
-    """The steps from constraints to explicit equations, and the names of what must not vanish on the way."""
+    """Steps from constraints to explicit equations, with the names of expressions that must not vanish."""
 
     x: TracedEquations
     names: tuple[str, ...]
@@ -387,11 +388,11 @@ class _Reduction:
         return [Definition((s,), (y,), (), how) for s, y in zip(symbols, values, strict=True)]
 
     def _multipliers(self, rows: list[int], lam: np.ndarray) -> list[Definition]:
-        """Multipliers of rows; those of redundant rows are declared nothing. Loads that follow from them."""
+        """Multipliers of rows (0 for redundant rows), and the loads that follow from them."""
         x = self.x
         all_ = self._all(rows, lam)
         out: list[Definition] = []
-        if x.loads:  # these are in f, and so in the multipliers
+        if x.loads:  # loads are in f, and therefore in the multipliers
             into: Mapping[int, Any] = dict(enumerate(all_))
             found = Definition(tuple(x.lam), tuple(into[k] for k in range(len(x.lam))))
             returned = FormulaSubstitution([found])([x.graph.node(y) for y in x.returned])
@@ -405,7 +406,7 @@ class _Reduction:
         return out
 
     def _undetermined(self) -> tuple[str, ...]:
-        """Elements whose reactions redundancy leaves open."""
+        """Elements whose reactions are undetermined because of redundant constraints."""
         y = fundamental_subspaces(normalised_rows(self.place.G, self.place.scale)).dependencies
         open_ = np.abs(y).max(axis=1, initial=0.0) > 1e-8
         return tuple(dict.fromkeys(e for e, yes in zip(self.place.c.elements, open_, strict=True) if yes))

@@ -21,8 +21,8 @@ StateNumbers = Sequence[float] | np.ndarray
 class StateEquations:
     """State space of a mechanism, with names: x' = f(x, u, t), y = h(x, u, t).
 
-    The states are the independent coordinates (of a body's orientation all four Euler parameters), then their rates. An
-    input that moves a driver is three: itself, its rate and its acceleration.
+    The states are the independent coordinates (all four Euler parameters of a body's orientation), then their rates. An
+    input that moves a driver counts as three: itself, its rate and its acceleration.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class StateEquations:
     x, u : list of Node
         Symbols of states and inputs.
     f, h : Expressions
-        In x, u, t and parameters; what has no formula is a symbol of its own (`implicit`).
+        Functions of x, u, t and parameters; implicit coordinates are symbols (`implicit`).
     start : ndarray (nx,)
         The state as described and assembled.
     """
@@ -57,11 +57,11 @@ class StateEquations:
 
     @property
     def implicit(self) -> tuple[str, ...]:
-        """Coordinates, and loads of joints with friction, that have no formula: Newton's method finds them."""
+        """Coordinates and loads of joints with friction without a formula, which Newton's method computes."""
         return tuple(n for d in self._implicit for n in d.names)
 
     def _refuse_others(self) -> None:
-        """Refuse what is neither state nor input."""
+        """Refuse symbols that are neither states nor inputs."""
         known = {s.index for s in (*self.x, *self.u, self.t, *(w for d in self._implicit for w in d.symbols))}
         for s in symbols_of([*self.f.list(), *self.h.list()]):
             if s.moving and s.index not in known:
@@ -75,7 +75,7 @@ class StateEquations:
     def jacobian(self, what: Expressions, by: Sequence[str] | None = None) -> Expressions:
         """Total derivatives by states, inputs, time or parameters, (expressions, by): A, B, C, D anywhere.
 
-        What has no formula changes with these as its equations say: dw/dx = -(dr/dw)^-1 dr/dx.
+        Implicit coordinates w change with these by dw/dx = -(dr/dw)^-1 dr/dx.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class StateEquations:
         Raises
         ------
         ModelError
-            If a Python function whose derivative is not known stands in the way.
+            If a Python function has no known derivative.
         """
         names = self.states if by is None else tuple(by)
         seeds = [self.graph.symbol(s.data) for s in (self._symbol(n) for n in names)]
@@ -116,13 +116,13 @@ class StateEquations:
         t: float = 0.0,
         parameters: Mapping[str, float] | None = None,
     ) -> dict[str, float]:
-        """Numbers of all symbols at a state, for `Expressions.at`; what has no formula is found by Newton's method.
+        """Values of all symbols at a state, for `Expressions.at`; implicit ones by Newton's method.
 
         Parameters
         ----------
         x : sequence of float (nx,)
         u : sequence of float (nu,), optional
-            Zeros for what is added to laws, parameters' own values, if not given.
+            By default zero for inputs added to laws, and the parameters' own values.
         t : float [s]
         parameters : mapping, optional
 
@@ -155,12 +155,12 @@ class StateEquations:
         t: float = 0.0,
         parameters: Mapping[str, float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers x' (nx,) and y (ny,) at a state; see `point`."""
+        """Values of x' (nx,) and y (ny,) at a state; see `point`."""
         found = np.array(evaluate([*self.f.list(), *self.h.list()], self.point(x, u, t, parameters)), float)
         return found[: len(self.x)], found[len(self.x) :]
 
     def __call__(self, t: float, x: np.ndarray, *u: float) -> np.ndarray:
-        """x' as ``scipy.integrate.solve_ivp`` asks for it; further arguments are the inputs, all or none."""
+        """x' with the signature of ``scipy.integrate.solve_ivp``; further arguments are the inputs, all or none."""
         return self.evaluate(x, u or None, t)[0]
 
     def _initial_values(self) -> list[ImplicitSolver]:

@@ -1,8 +1,8 @@
 """Whether expressions are equal or zero, decided by their values at random points.
 
-An expression that is zero at several random points is zero (Schwartz 1980, Zippel 1979, for polynomials, which all
-expressions here are in the coordinates' sines and cosines); rounding is distinguished by the size of the terms that
-cancel.
+An expression that is zero at several random points is zero (Schwartz 1980, Zippel 1979, for polynomials; all
+expressions here are polynomials in sines and cosines of the coordinates). The size of the cancelling terms separates
+zero from rounding.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from ...expression_graph.graph import CALL, NUMBER, OPERATIONS, SYMBOL, Node
 from .definitions import new_nodes
 
 RANDOM_POINTS = 5
-ZERO_TOLERANCE = 1e-11  # of the largest of its kind: rounding
-PARAMETER_VARIATION = 1e-3  # part that parameters are changed by: what holds for their own values only does not hold
+ZERO_TOLERANCE = 1e-11  # values below this part of the cancelling terms are rounding
+# Random relative change of parameters: an identity must not depend on their own values.
+PARAMETER_VARIATION = 1e-3
 
 
 class Probe:
-    """Random values of all symbols, near those of a start."""
+    """Random values of all symbols, near initial ones."""
 
     def __init__(self, start: Mapping[str, float], seed: int = 0) -> None:
         self.start = start
@@ -30,7 +31,7 @@ class Probe:
         self._known: dict[int, Any] = {}
 
     def values(self, nodes: Sequence[Any]) -> np.ndarray:
-        """Values of expressions, (expressions, places)."""
+        """Values of expressions, (expressions, points)."""
         known = self._known
         for x in new_nodes(nodes, known):
             if x.op == NUMBER:
@@ -52,7 +53,7 @@ class Probe:
         return self.start.get(x.data.name, 0.0) + around
 
     def zero(self, x: Any, size: float = 0.0) -> bool:
-        """Whether an expression is nothing, compared with ``size`` and with what it is the sum of."""
+        """Whether an expression is zero, compared with ``size`` and with the terms of its sum."""
         if not isinstance(x, Node) or x.op == NUMBER:
             return abs(float(x)) <= ZERO_TOLERANCE * size
         with np.errstate(all="ignore"):
@@ -60,7 +61,7 @@ class Probe:
             return bool(value <= ZERO_TOLERANCE * max(size, self._terms(x)))
 
     def _terms(self, x: Node) -> float:
-        """The largest of the terms that a sum is made of."""
+        """Largest term of a sum."""
         found, to_see = [], [x]
         while to_see:
             y = to_see.pop()
@@ -71,18 +72,18 @@ class Probe:
         return float(np.abs(self.values(found)).max()) if len(found) > 1 else 0.0
 
     def size(self, x: Any) -> float:
-        """The largest value of an expression, at least what it is the sum of."""
+        """Largest value of an expression or of the terms of its sum."""
         if not isinstance(x, Node):
             return abs(float(x))
         with np.errstate(all="ignore"):
             return max(float(np.abs(self.values([x])).max()), self._terms(x))
 
     def without_nothing(self, x: Any, size: float) -> Any:
-        """The same, or a plain zero if it is nothing beside ``size``."""
+        """The expression, or 0 if it is zero compared with ``size``."""
         return 0.0 if self.zero(x, size) else x
 
     def simplest(self, x: Any) -> Any:
-        """The same, or a plain number where it is a whole one everywhere."""
+        """The expression, or a number if it equals an integer everywhere."""
         if not isinstance(x, Node):
             return x
         found = self.values([x])[0]
@@ -90,19 +91,19 @@ class Probe:
         return float(whole) if whole and np.abs(found - whole).max() <= ZERO_TOLERANCE * abs(whole) else x
 
     def know(self, name: str, value: float) -> None:
-        """Another symbol's value at the start."""
+        """Set the initial value of another symbol."""
         self.start = {**self.start, name: value}
 
     def at_start(self, x: Any) -> float:
-        """Value at the start, with the parameters' own values."""
+        """Initial value, with the parameters' own values."""
         return float(evaluate([x], self.start)[0])
 
     def same(self, x: Any, y: Any, size: float = 0.0) -> bool:
-        """Whether two expressions are one."""
+        """Whether two expressions are equal."""
         return x is y or self.zero(x - y, size)
 
     def cleaned(self, A: np.ndarray) -> np.ndarray:
-        """The same matrix with plain zeros where entries are nothing beside the largest of their row."""
+        """The matrix with 0 for entries that are zero compared with the largest of their row."""
         out = A.copy()
         flat = [x if isinstance(x, Node) else float(x) for x in A.ravel()]
         with np.errstate(all="ignore"):

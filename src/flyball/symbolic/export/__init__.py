@@ -1,6 +1,6 @@
 """Equations written as code: functions of a mechanism in C, Python, CasADi or Numba.
 
-`functions` says what can be exported, each with arguments and results; `solution` writes the regularised solve out,
-with as many refinements as declared; `code` is what `Mechanism.export` returns. A new language is a printer in
+`functions` defines what can be exported, with arguments and results; `solution` writes the regularised solve as code
+with a fixed number of refinements; `Mechanism.export` returns a `code.Code`. A new language is a printer in
 `expression_graph.printers`, an entry of `code.LANGUAGES` and its branches there.
 """

@@ -41,7 +41,7 @@ CALLING_CONVENTIONS = {
 
 
 def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> str:
-    """Text of a head."""
+    """Header comment of a file."""
     from ... import __version__
 
     told = [
@@ -68,7 +68,7 @@ def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> st
 
 
 def argument_constants(eq: Equations, start: Mapping[str, np.ndarray]) -> dict[str, Sequence[object]]:
-    """Names of the arguments' entries, and what they are at the start."""
+    """Names of the arguments' entries, and their initial values."""
     names = {"q": eq.q.rows, "v": eq.v.rows, "lam": eq.lam.rows, "u": eq.inputs, "p": tuple(eq.parameters)}
     named = {f"{k}_names": x for k, x in names.items() if x}
     return named | {
@@ -83,25 +83,25 @@ LANGUAGES = ("c", "python", "casadi", "numba")
 class Code:
     """Functions of a mechanism as code.
 
-    ``code["right_hand_side"]`` is one of them, to be called: a Python function for ``python`` and ``numba``, a
-    ``casadi.Function`` for ``casadi``. C has to be compiled first.
+    ``code["right_hand_side"]`` is a callable function: a Python function for ``python`` and ``numba``, a
+    ``casadi.Function`` for ``casadi``. C must be compiled first.
 
     Attributes
     ----------
     language : {"c", "python", "casadi", "numba"}
     name : str
-        What files are called, and what names in C begin with.
+        Name of the files, and prefix of names in C.
     texts : dict of str to str
-        Name of a file -> what it holds; the functions of CasADi are files besides.
+        File name -> its text; the functions of CasADi are separate files.
     operations : dict of str to int
-        How many operations each function takes, what functions have in common counted in each.
+        Number of operations of each function; common operations count in each.
     names : dict of str to tuple of str
-        What the entries of each argument are: ``names["q"]``.
+        Names of the entries of each argument: ``names["q"]``.
     start : dict of str to ndarray
-        ``q`` and ``v`` as described and assembled, ``places`` on curves, values of the inputs ``u`` and parameters
-        ``p``.
+        ``q`` and ``v`` as described and assembled, curve parameters ``places``, values of the inputs ``u`` and
+        parameters ``p``.
     files : tuple of Path
-        Those that were written.
+        Files that were written.
     """
 
     language: str
@@ -139,7 +139,7 @@ class Code:
         return self.functions[name]
 
     def written(self, folder: str | Path) -> Code:
-        """Write the files to a folder, which is made where it is not there; the same code, which names them."""
+        """Write the files to a folder, which is created if missing; returns the code with the file names."""
         folder = make_folder(folder)
         for name, text in self.texts.items():
             write_file(folder / name, text)
@@ -147,7 +147,7 @@ class Code:
         if self.language == "casadi":
             for name, f in self.functions.items():
                 written.append(folder / f"{self.name}_{name}.casadi")
-                with TemporaryDirectory() as aside:  # CasADi writes files by itself
+                with TemporaryDirectory() as aside:  # CasADi writes its files itself
                     f.save(str(Path(aside) / name))
                     write_file(written[-1], (Path(aside) / name).read_bytes())
         return replace(self, files=tuple(written))
@@ -203,12 +203,12 @@ def export_equations(
     names = {a.name: tuple(x.data.name for x in a.nodes) for a in made.arguments.values()}
     code = Code(language, called, texts, {r.name: r.operations for r in routines}, names, start, routines)
     if language == "casadi":
-        _ = code.functions  # what cannot be written is refused now
+        _ = code.functions  # refuses functions that cannot be written
     return code if folder is None else code.written(folder)
 
 
 def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
-    """What state, places, inputs and parameters are at the start."""
+    """Initial values of state, curve parameters, inputs and parameters."""
     wanted = {p.symbol.data.name: p.symbol for p in eq.named_equations.places}
     known = eq.checked(eq.start, wanted)
     values: dict[str, list[float]] = {
@@ -221,7 +221,7 @@ def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
 
 
 def _annotate_functions(eq: Equations, routines: Sequence[Routine]) -> None:
-    """Tell Python functions whose laws they are."""
+    """Record for Python functions which laws they belong to, for messages."""
     laws = {id(c.native.python): c.where for c in eq.named_equations.values.structure.functions}
     for _, f in python_functions_of(routines, Identifiers()).values():
         f.told["of"] = laws.get(id(f.python), "")
@@ -233,7 +233,7 @@ def _identifier(name: str, language: str) -> str:
 
 
 def _loader(routines: Sequence[Routine], name: str, top: str, constants_text: Mapping[str, Sequence[Any]]) -> str:
-    """A module that reads the functions of CasADi."""
+    """Text of a module that loads the functions of CasADi."""
     read = "".join(f'{r.name} = ca.Function.load(str(HERE / "{name}_{r.name}.casadi"))\n' for r in routines)
     imports = "from pathlib import Path\n\nimport casadi as ca\n"
     return f'"""{top}\n"""\n\n{imports}{constant_definitions(constants_text)}\nHERE = Path(__file__).parent\n{read}'

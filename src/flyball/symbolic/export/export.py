@@ -16,7 +16,7 @@ from .code import Code
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOptions(Options):
-    """What `Mechanism.export` is asked."""
+    """Arguments of `Mechanism.export`."""
 
     folder: str | Path | None
     language: str

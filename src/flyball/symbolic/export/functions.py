@@ -1,4 +1,4 @@
-"""What can be exported of a mechanism: each function with its arguments, results and what they mean."""
+"""Functions that can be exported of a mechanism, with arguments, results and their meanings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Functions:
     ----------
     equations : Equations
     outputs : sequence of str
-        Quantities by name that the function ``outputs`` gives.
+        Names of the quantities that the function ``outputs`` returns.
     """
 
     def __init__(self, equations: Equations, outputs: Sequence[str] = ()) -> None:
@@ -51,12 +51,12 @@ class Functions:
 
     @property
     def names(self) -> list[str]:
-        """Functions that this mechanism has."""
+        """Names of the functions of this mechanism."""
         return [k for k in FUNCTIONS if k != "outputs" or self.outputs]
 
     @cached_property
     def arguments(self) -> dict[str, Argument]:
-        """All that a function may be given, in order; what a mechanism does not have is left out."""
+        """All possible arguments, in order; those that the mechanism does not have are left out."""
         eq, x = self.equations, self.traced
         named = eq.named
         u = [named[k] for k in eq.inputs]
@@ -76,7 +76,7 @@ class Functions:
         return {k: a for k, a in found.items() if a.single or a.nodes}
 
     def _arguments(self, usual: Sequence[str], results: dict[str, Any]) -> list[Argument]:
-        """The usual arguments of a function, and those that it takes besides for this mechanism."""
+        """The standard arguments of a function, and further ones that it needs for this mechanism."""
         nodes = [x for a in results.values() for x in np.ravel(a)]
         met = {x.index for x in nodes_in_order(nodes) if x.op == SYMBOL}
         return [a for k, a in self.arguments.items() if k in usual or any(x.index in met for x in a.nodes)]
@@ -88,14 +88,14 @@ class Functions:
 
     @cached_property
     def solved(self) -> list[tuple[Node, Any]]:
-        """What stands for the symbols of accelerations, multipliers and loads at a state."""
+        """Replacements for the symbols of accelerations, multipliers and loads at a state."""
         x, found = self.traced, self.solution
         pairs = ((self.equations.named_equations.vdot, found.vdot), (x.lam, found.lam), (x.loads, found.loads))
         return [(symbol, value) for symbols, values in pairs for symbol, value in zip(symbols, values, strict=True)]
 
     @property
     def carried(self) -> list[str]:
-        """Names of bodies and frames whose poses are asked for."""
+        """Names of bodies and frames whose poses are exported."""
         model = self.equations.model
         return [e.name for e in (*model.bodies, *model.frames)]
 
@@ -121,7 +121,7 @@ class Functions:
         return found
 
     def stacked(self, k: int) -> np.ndarray:
-        """One of these of all bodies and frames."""
+        """Item k of these records, of all bodies and frames."""
         parts = [np.asarray(r[k], object) for r in self.records()]
         made = np.empty((len(parts), *parts[0].shape), object)
         for n, a in enumerate(parts):
@@ -131,11 +131,11 @@ class Functions:
 
 FunctionParts = tuple[dict[str, Any], str, str, dict[str, str]]
 FUNCTIONS: dict[str, Callable[[Functions], FunctionParts]] = {}
-"""Functions by name: results, their usual arguments, what the function is, what the results are."""
+"""Functions by name: results, standard arguments, meaning of the function and of its results."""
 
 
 def exported_function(make: Callable[[Functions], FunctionParts]) -> Callable[[Functions], FunctionParts]:
-    """Make a function known by its name."""
+    """Register a function by its name."""
     FUNCTIONS[make.__name__.rstrip("_")] = make
     return make
 

@@ -2,10 +2,10 @@
 
     [M G^T; G 0] [vdot; -lam] = [f; gamma]
 
-No matrix is inverted: the matrices are factored sparsely, with the engine's regularisation, and the solution is
-refined a fixed number of times, since straight-line code cannot decide when to stop. Multipliers that redundancy
-leaves undetermined are those of the engine. Loads of joints with friction, of which the forces are linear
-functions, follow from a fixed number of Newton steps, beginning with no load.
+No matrix is inverted: the matrices are factorised sparsely with the engine's regularisation, and the solution is
+refined a fixed number of times, since straight-line code cannot test convergence. Multipliers that redundant
+constraints leave undetermined are those of the engine. Forces are linear functions of the loads of joints with
+friction; the loads follow from a fixed number of Newton steps that start without load.
 """
 
 from __future__ import annotations
@@ -25,20 +25,23 @@ from ...expression_graph.tracing import TracedEquations
 from ...numerics.sparse_factorisation import LDLPattern, analyse_ldl, ldl_factor, ldl_solve
 from ...tables.table_definitions import map_arrays
 
-REFINEMENTS = 2  # what the regularisation leaves of a well determined solution goes below rounding with the first
-LIGHT_VELOCITIES = 4  # where a mass is semidefinite, a stand-in has to be taken out too
-NEWTON_STEPS = 7  # of Newton's for loads: quadratic from the first step on whose side the solution is
+# The first refinement reduces the regularisation error of a well determined solution below rounding.
+REFINEMENTS = 2
+# A semidefinite mass matrix uses substitute masses, whose effect must be removed, too.
+LIGHT_VELOCITIES = 4
+# Newton steps for loads; convergence is quadratic from the first step on the solution's side.
+NEWTON_STEPS = 7
 
 SinglePass = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass
 class Solution:
-    """What the equations of motion give at a state that fulfils g = 0 and G v = nu."""
+    """Solution of the equations of motion at a state that fulfils g = 0 and G v = nu."""
 
     vdot: np.ndarray  # (nv,)
     lam: np.ndarray  # (nr,)
-    loads: np.ndarray  # (nl,): of joints with friction
+    loads: np.ndarray  # (nl,), of joints with friction
 
 
 def solve_traced(x: TracedEquations) -> Solution:
@@ -46,13 +49,13 @@ def solve_traced(x: TracedEquations) -> Solution:
 
     Parameters
     ----------
-    x : Traced
-        With rows for all that drivers prescribe, as `symbolic.named_equations` has them.
+    x : TracedEquations
+        With rows for all prescribed coordinates, as in `symbolic.named_equations`.
 
     Raises
     ------
     ModelError
-        If a force is no linear function of the load of a joint with friction.
+        If a force is not a linear function of the load of a joint with friction.
     """
     once = coupled(x) if len(x.system.mass_entries.row) else schur(x)
     if not x.loads:
@@ -61,7 +64,7 @@ def solve_traced(x: TracedEquations) -> Solution:
 
 
 def _refined(x: TracedEquations, once: SinglePass, f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A solution, put right by what it misses of the true equations."""
+    """Solution refined by its residuals in the unregularised equations."""
     light = x.system.scales.semidefinite > 0.0
     balanced = not len(x.system.mass_entries.row) and not light  # each step fulfils M vdot = f + G^T lam then
     vdot, lam = once(f, gamma)
@@ -77,7 +80,7 @@ def _forces(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
 
 
 def schur(x: TracedEquations) -> SinglePass:
-    """Through S = G M^-1 G^T, M being of the bodies themselves: `solve.factor_schur`."""
+    """Solution by S = G M^-1 G^T with the mass matrix M of single bodies: `solve.factor_schur`."""
     S, nr = x.system, len(x.lam)
     rows = np.repeat(np.arange(nr), np.diff(S.row_start[: nr + 1]))
     W = x.work._replace(
@@ -106,7 +109,7 @@ def schur(x: TracedEquations) -> SinglePass:
 
 
 def coupled(x: TracedEquations) -> SinglePass:
-    """With [M G^T; G -delta]: `solve.factor_coupled`; zeros that the tables cannot know are left out of the pattern."""
+    """Solution by [M G^T; G -delta]: `solve.factor_coupled`; symbolic zeros are left out of the pattern."""
     nv, nr = len(x.v), len(x.lam)
     K = np.zeros((nv + nr, nv + nr), object)
     K[:nv, :nv] = x.M
@@ -133,26 +136,26 @@ def coupled(x: TracedEquations) -> SinglePass:
 
 
 def inertia_velocities(x: TracedEquations, k: int) -> list[int]:
-    """Velocities whose inertia says how large row k is: all that it could touch, without those prescribed."""
+    """Velocities whose inertia scales row k: all that it can act on, except prescribed ones."""
     S = x.system
-    if k >= len(S.rows.law):  # of a driver that prescribes a velocity
+    if k >= len(S.rows.law):  # row of a driver that prescribes a velocity
         return possible_entries(x.G[k])
     entries = range(S.row_start[k], S.row_start[k + 1])
     return [int(S.column[e]) for e in entries if S.pairs.place[e] < len(S.ldl.Ai)]
 
 
 def possible_entries(row: np.ndarray) -> list[int]:
-    """Places of a row that are not known to be zero."""
+    """Indices of the entries of a row that are not known to be zero."""
     return [d for d, entry in enumerate(row) if not entry == 0.0]
 
 
 def factor_matrix(P: LDLPattern, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L and the inverse diagonal: the engine's own factor on nodes, which takes pivots for granted.
+    """L and the inverse diagonal, by the engine's factorisation on nodes, which assumes nonzero pivots.
 
     Raises
     ------
     ModelError
-        If it takes more operations than straight-line code is written of.
+        If it takes too many operations for straight-line code.
     """
     _refuse_long(P)
     n = len(P.perm)
@@ -167,7 +170,7 @@ def _refuse_long(P: LDLPattern) -> None:
 
 
 def solve_factored(P: LDLPattern, L: np.ndarray, D: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Solve with a factor."""
+    """Solve with the factors."""
     z = zero_objects(len(b))
     z[P.perm] = b
     ldl_solve(P, L, D, z)
@@ -175,7 +178,7 @@ def solve_factored(P: LDLPattern, L: np.ndarray, D: np.ndarray, b: np.ndarray) -
 
 
 def _loaded(x: TracedEquations, once: SinglePass) -> Solution:
-    """Where friction depends on the reactions and these on friction.
+    """Solution where friction depends on the reactions, and these on friction.
 
     Multipliers are linear functions of the loads, lam = lam0 + K load; each load is a norm of some of them.
     """
@@ -197,7 +200,7 @@ def _loaded(x: TracedEquations, once: SinglePass) -> Solution:
 
 
 def eliminate(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Solve a few equations by Gauss' elimination, in the order given: the diagonal is one less a slope below one."""
+    """Solve a few equations by Gaussian elimination without pivoting: the diagonal is one minus a slope below one."""
     A, b, n = A.astype(object), b.copy(), len(b)
     for k in range(n):
         for i in range(k + 1, n):

@@ -35,31 +35,31 @@ from ...tables.values import Values, values
 
 @dataclass
 class TracedMechanism:
-    """A mechanism as expressions: its equations of motion, its drawn state, its inputs.
+    """A mechanism as expressions: its equations of motion, its reference state, its inputs.
 
     Attributes
     ----------
     values : Values
-        Tables and drawn state, of expressions.
-    x : Traced
+        Tables and reference state, as expressions.
+    x : TracedEquations
     given : dict
         Parameter -> its symbol.
     env : dict
-        Parameter -> what it is, an expression of those that have a value of their own.
+        Parameter -> expression of the parameters that have their own value.
     inputs : list of Input
-    names : list of Named
-        Of all velocities.
+    names : list of VelocityName
+        Names of all velocities.
     vdot : list of Node
         Symbols of the accelerations.
     g, n : ndarray (rows,)
-        Constraints on positions and velocities, G v - nu; prescribed coordinates behind the rows.
+        Constraints on positions, and on velocities, G v - nu; prescribed coordinates follow the rows.
     multipliers : list of Node
-        Symbols, those of prescribed coordinates (their efforts) behind those of the rows.
+        Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts).
     r : ndarray (nv,)
         M vdot - f - G^T lam - efforts.
     holonomic : ndarray of bool (rows,)
-    laws : list of (which coordinate, which velocity, Node, Node)
-        Coordinates that drivers prescribe, and their rates.
+    laws : list of (index of coordinate, index of velocity, Node, Node)
+        Prescribed coordinates, and the expressions of their values and rates.
     """
 
     values: Values
@@ -78,12 +78,12 @@ class TracedMechanism:
 
     @property
     def graph(self) -> Graph:
-        """Where all expressions live."""
+        """The graph of all expressions."""
         return self.x.graph
 
     @property
     def model(self) -> Model:
-        """The mechanism, with the inputs in its laws."""
+        """The model, with the inputs in its laws."""
         return self.values.structure.model
 
     @property
@@ -93,17 +93,17 @@ class TracedMechanism:
 
     @property
     def added(self) -> list[Node]:
-        """Symbols of those inputs that are no parameters of the mechanism: zero at the point."""
+        """Symbols of the inputs that are no parameters of the mechanism: zero at the point."""
         return [self.given[i.parameter] for i in self.inputs if i.name != i.parameter]
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """What a large step is along every velocity, in parts of the mechanism's length."""
+        """Natural step along every velocity, relative to the mechanism's length."""
         return np.array([1.0 if k.unit == "m" else 1.0 / self.values.length for k in self.names])
 
     @cached_property
     def result(self) -> Result:
-        """The state as a result of expressions at one time: outputs are its curves."""
+        """The state as a result with one time, of expressions; outputs are its curves."""
         x = self.x
         q, v, a, lam, z = (object_vector(part)[None] for part in (x.q, x.v, self.vdot, self.multipliers, x.z))
         health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)
@@ -128,7 +128,7 @@ def trace_mechanism(
     inputs : sequence of str
         See `Mechanism.linearize`.
     changed_parameters : mapping, optional
-        Values of parameters in place of the model's own.
+        Values of parameters that replace the model's own.
 
     Raises
     ------
@@ -171,22 +171,22 @@ def trace_mechanism(
 
 
 def refuse_unknown(model: Model, outputs: Sequence[str]) -> None:
-    """Refuse outputs that there are not."""
+    """Refuse unknown outputs."""
     for name in outputs:
         single_quantity(model, name)
 
 
 def _with_values(model: Model, changed_parameters: Mapping[str, float]) -> Model:
-    """A copy whose parameters have these values."""
+    """Copy of the model with these parameter values."""
     out = model.copy()
-    out.environment(changed_parameters)  # refuses those that do not exist
+    out.environment(changed_parameters)  # refuses unknown parameters
     for name, x in changed_parameters.items():
         out.parameters[name] = x
     return out
 
 
 def _prescribed(x: TracedEquations) -> list[tuple[int, int, Node, Node]]:
-    """Coordinates that drivers prescribe: where they and their rates stand, and what these are."""
+    """Prescribed coordinates: indices of coordinate and velocity, expressions of value and rate."""
     S, s = x.system, x.structure
     stack = zero_objects(s.depth + 1, 3)
     out = []
@@ -202,7 +202,7 @@ BY = ("x", "v", "a", "l", "w")
 
 @dataclass
 class Perturbed:
-    """Values and derivatives of the equations at a point; objects: expressions of parameters, or numbers.
+    """Values and derivatives of the equations at a point, as expressions of parameters, or numbers.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Perturbed:
     N : ndarray (nv, nv)
         (rate of a change of position) = (change of velocity) + N (change of position).
     T : ndarray (nq, nv)
-        Qdot = T v.
+        Matrix of qdot = T v.
     """
 
     value: dict[str, np.ndarray]
@@ -222,7 +222,7 @@ class Perturbed:
     T: np.ndarray
 
     def replaced(self, pairs: Sequence[tuple[Node, Node]]) -> Perturbed:
-        """With other expressions in place of parameters."""
+        """Replace parameters by other expressions."""
 
         def new(X: np.ndarray) -> np.ndarray:
             out = X.copy()
@@ -234,11 +234,11 @@ class Perturbed:
 
 
 class Derivatives:
-    """Everything once, as expressions of the state.
+    """All equations and their derivatives, as expressions of the state.
 
     Parameters
     ----------
-    m : Mechanics
+    m : TracedMechanism
     outputs : sequence of Node
     """
 
@@ -259,16 +259,16 @@ class Derivatives:
 
     @property
     def all(self) -> list[Any]:
-        """Every expression, in the order in which `at` takes their values."""
+        """All expressions, in a fixed order."""
         columns = [x for of in self.columns.values() for column in of for x in column]
         return [*self.nodes, *columns, *self.N.ravel(), *self.m.x.T.ravel()]
 
     def at(self, point: Sequence[tuple[Node, Any]]) -> Perturbed:
-        """With other expressions in place of the state's symbols."""
+        """Replace the symbols of the state by other expressions."""
         return self._sorted(substitute(self.all, point))
 
     def near(self, point: Mapping[str, float]) -> Perturbed:
-        """In numbers; symbol's name -> value."""
+        """Evaluate with numbers; symbol's name -> value."""
         return self._sorted(evaluate(self.all, point))
 
     def _sorted(self, found: list[Any]) -> Perturbed:
@@ -298,7 +298,7 @@ def _row(x: Sequence[Any]) -> np.ndarray:
 
 
 def _turning(m: TracedMechanism) -> np.ndarray:
-    """N: changes of rotations have components along axes that turn."""
+    """Matrix N: the changes of rotations have components along turning axes."""
     nv = len(m.x.v)
     N = zero_objects(nv, nv)
     for b in range(len(m.x.system.tree.parent)):

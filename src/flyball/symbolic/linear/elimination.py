@@ -1,6 +1,6 @@
-"""Gaussian elimination on expressions, pivots chosen by value; and which expressions are zero.
+"""Gaussian elimination on expressions with pivots chosen by value, and detection of zero expressions.
 
-The size of the terms of a sum bounds what rounding leaves of it.
+The size of the terms of a sum bounds its rounding error.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from ...expression_graph.evaluation import nodes_in_order, symbols_of
 from ...expression_graph.graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, SYMBOL, Node, zero_objects
 
-GOOD_PIVOT = 1e-3  # part of the largest pivot that one which is simpler may have
-ZERO_TOLERANCE = 1e-12  # part of its row below which a pivot is none
+GOOD_PIVOT = 1e-3  # smallest accepted pivot relative to the largest, if its expression is simpler
+ZERO_TOLERANCE = 1e-12  # pivots below this part of their row count as zero
 
 
 class DependentEquations(Exception):
-    """Equations that depend on each other: ``row`` is left without a pivot."""
+    """The equations are dependent: ``row`` has no pivot."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"row {row} depends on the others")
@@ -26,7 +26,7 @@ class DependentEquations(Exception):
 
 
 def nominal_value(x: Any) -> float:
-    """Its value with the parameters' own values."""
+    """Value of an expression with the parameters' own values."""
     return float(x.real)
 
 
@@ -36,7 +36,7 @@ def nominal_values(A: np.ndarray) -> np.ndarray:
 
 
 def matrix_product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """A B, zeros left out."""
+    """Product A B, skipping zeros."""
     out = zero_objects(A.shape[0], B.shape[1])
     for i, row in enumerate(A):
         for k, a in enumerate(row):
@@ -48,12 +48,12 @@ def matrix_product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
 
 def is_zero(x: Any) -> bool:
-    """Whether it is zero for all values of everything."""
+    """Whether an expression is identically zero."""
     return bool(x == 0.0)
 
 
 def solve_equations(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """X with A X = B.
+    """Solve A X = B.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def solve_equations(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
     Raises
     ------
-    Dependent
+    DependentEquations
         If A is singular with the parameters' own values.
     """
     A, B = A.astype(object), B.astype(object)
@@ -102,7 +102,7 @@ def _subtract_multiple(row: np.ndarray, f: Any, other: np.ndarray, columns: Sequ
 
 
 def _pivot(A: np.ndarray, remaining: Sequence[int], columns: Sequence[int], size: np.ndarray) -> tuple[int, int]:
-    """The simplest entry that is large enough: a number, in a row and column with few others (Markowitz 1957)."""
+    """Simplest entry that is large enough: a number, in a row and column with few others (Markowitz 1957)."""
     found = []
     part = {
         (i, j): abs(nominal_value(A[i, j])) / (size[i] or 1.0)
@@ -123,12 +123,12 @@ def _pivot(A: np.ndarray, remaining: Sequence[int], columns: Sequence[int], size
     return i, j
 
 
-ROUNDING_TOLERANCE = 1e-12  # of its terms: what is left of an expression that is zero
+ROUNDING_TOLERANCE = 1e-12  # values below this part of the terms are rounding
 RANDOM_DRAWS = 3
 
 
 def values_and_sizes(nodes: Sequence[Any], values: Mapping[str, float] | None = None) -> list[tuple[float, float]]:
-    """(value, sum of the absolute values of all terms); with the parameters' own values, or others."""
+    """(value, sum of the absolute values of all terms) of expressions, with the parameters' own or other values."""
     told = values or {}
     found: dict[int, tuple[float, float]] = {}
     for x in nodes_in_order(nodes):
@@ -151,7 +151,7 @@ def values_and_sizes(nodes: Sequence[Any], values: Mapping[str, float] | None = 
 
 
 def identically_zero(nodes: Sequence[Any]) -> list[bool]:
-    """Which expressions are zero for all values of their parameters, by values that are drawn near their own."""
+    """Which expressions are identically zero, tested with random parameter values near their own."""
     rng = np.random.default_rng(0)
     out = np.ones(len(nodes), bool)
     for _ in range(RANDOM_DRAWS):

@@ -1,7 +1,7 @@
 """Whether an operating point is an equilibrium or a steady motion, and for which parameters.
 
-Multipliers are those that balance the forces at the point. What remains must vanish by itself: conditions on the
-parameters. A motion with constant rates must look the same at later times.
+The multipliers balance the forces at the point. The remaining forces must vanish by themselves: these are conditions on
+the parameters. A motion with constant rates must look the same at later times.
 """
 
 from __future__ import annotations
@@ -30,17 +30,19 @@ from .elimination import (
 from .operating_point import OperatingPoint
 from .reduction import Freedoms, reduce_linear, scaled_rows, with_bases_of
 
-BALANCE_TOLERANCE = 1e-6  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
-ZERO_FORCE_TOLERANCE = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
+# Largest residual at an equilibrium, relative to the cancelling terms and to the largest force.
+BALANCE_TOLERANCE = 1e-6
+# Position error allowed at an equilibrium [rad, or relative to the mechanism's length].
+ZERO_FORCE_TOLERANCE = 1e-9
 
 
 def balancing_multipliers(m: TracedMechanism, point: OperatingPoint, f: Freedoms) -> np.ndarray:
-    """Multipliers (rows,) under which r = 0; those of rows that depend on others are 0.
+    """Multipliers (rows,) with r = 0; those of dependent rows are 0.
 
     Raises
     ------
     ModelError
-        If friction follows them: they are then no solution of linear equations.
+        If friction depends on them: the equations are then nonlinear.
     """
     lam = zero_objects(len(m.multipliers))
     if not len(f.rows_v):
@@ -58,7 +60,7 @@ def balancing_multipliers(m: TracedMechanism, point: OperatingPoint, f: Freedoms
 
 
 def _forces(m: TracedMechanism, point: OperatingPoint) -> tuple[np.ndarray, np.ndarray]:
-    """R without multipliers, and its derivatives by them."""
+    """Residual r without multipliers, and its derivatives by them."""
     by = jacobian(list(m.r), m.multipliers)
     flat = substitute([*m.r, *by.ravel()], point.replacing(m))
     nv = len(m.r)
@@ -70,7 +72,7 @@ def _forces(m: TracedMechanism, point: OperatingPoint) -> tuple[np.ndarray, np.n
 
 
 def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.ndarray, f: Freedoms) -> list[Node]:
-    """Forces along the free coordinates, which vanish at an equilibrium; those that always do are left out."""
+    """Forces along the free coordinates, which vanish at an equilibrium; identically zero ones are left out."""
     r = zero_objects(len(m.r), 1)
     r[:, 0] = substitute(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
     found = substitute(list(matrix_product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
@@ -78,7 +80,7 @@ def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.nd
 
 
 def not_identically_zero(nodes: Sequence[Any]) -> list[Node]:
-    """Those that do not vanish for all parameters; what is a number is rounding, or refused."""
+    """Expressions that do not vanish identically; constants are rounding, or refused."""
     told = [x for x, none in zip(nodes, identically_zero(nodes), strict=True) if isinstance(x, Node) and not none]
     return [x for x in told if not x.known]
 
@@ -88,19 +90,19 @@ def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at
 
     Parameters
     ----------
-    m : Mechanics
-    f : Free
+    m : TracedMechanism
+    f : Freedoms
     stiffness : ndarray
         Derivatives of r by positions there.
     at : dict
-        Values of all symbols there that are no parameters with their own values.
+        Values at the point of all symbols that are no parameters with their own values.
 
     Raises
     ------
     AnalysisError
-        If the velocities do not stay what they are.
+        If the velocities are not constant.
     ModelError
-        With what is left unbalanced.
+        With the residual forces.
     """
     moving = any(at[s.data.name] for s in m.x.v)
     if moving and m.x.lam:
@@ -124,7 +126,7 @@ def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at
 
 
 def unsteady_error(m: TracedMechanism) -> AnalysisError:
-    """The error for a motion that does not stay what it is."""
+    """The error for a motion that is not steady."""
     return AnalysisError(
         f"{m.model.name!r} does not stay there as it is: its velocities change, or its linear equations do. Symbolic "
         f"ones are about equilibria, and about motions in which coordinates of joints turn or slide evenly while all "
@@ -133,20 +135,20 @@ def unsteady_error(m: TracedMechanism) -> AnalysisError:
 
 
 def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence[str]) -> list[tuple[Node, Node]]:
-    """Parameters as the conditions of equilibrium ask for: (symbol, expression of the others).
+    """Parameters solved from the conditions of equilibrium: (symbol, expression of the others).
 
     Parameters
     ----------
-    m : Mechanics
+    m : TracedMechanism
     at : sequence of Node
         The conditions.
     names : sequence of str
-        As many parameters, in which these are linear.
+        As many parameters, in which the conditions are linear.
 
     Raises
     ------
     ModelError
-        If they do not tell these parameters, or not linearly.
+        If the conditions do not determine these parameters, or are not linear in them.
     """
     for name in names:
         if name not in m.given:
@@ -171,12 +173,12 @@ def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence
     return [(s, m.graph.node(x)) for s, x in zip(symbols, found, strict=True)]
 
 
-CLOSURE_TOLERANCE = 1e-7  # of the terms of a constraint: what may be left of it
+CLOSURE_TOLERANCE = 1e-7  # residual of a constraint relative to its terms
 
 
 @dataclass(frozen=True)
 class Validity:
-    """What has to vanish at a point, as expressions of the parameters.
+    """Conditions that must vanish at a point, as expressions of the parameters.
 
     Attributes
     ----------
@@ -190,12 +192,12 @@ class Validity:
     loops: Sequence[Node] = ()
 
     def refuse(self, name: str, values: Mapping[str, float]) -> None:
-        """Refuse values of parameters for which the point is another one.
+        """Refuse values of parameters for which the conditions do not hold.
 
         Raises
         ------
         ModelError
-            With what is left.
+            With the residuals.
         """
         told = ", ".join(f"{k} = {x:g}" for k, x in values.items())
         remedy = (
@@ -216,7 +218,7 @@ class Validity:
 
 
 def _residuals(nodes: Sequence[Node], values: Mapping[str, float], part: float) -> float | None:
-    """What does not vanish, beyond rounding and what is left with the parameters' own values."""
+    """Largest residual beyond rounding and beyond that with the parameters' own values; None if none."""
     if not values or not nodes:
         return None
     here, own = values_and_sizes(nodes, values), values_and_sizes(nodes)
@@ -227,22 +229,24 @@ def _residuals(nodes: Sequence[Node], values: Mapping[str, float], part: float) 
     return None
 
 
-TEST_DURATION = 0.1  # angle [rad], or part of the mechanism's length, that it moves by between the instants compared
+# Motion between the two times compared: angle [rad], or distance relative to the mechanism's length.
+TEST_DURATION = 0.1
 TEST_STEPS = 8
-STEADY_TOLERANCE = 1e-7  # relative difference of equations that are the same
+STEADY_TOLERANCE = 1e-7  # relative difference below which equations are equal
 NEARBY_STEP = (
-    1e-2  # part of a radian, or of the mechanism's length, that it is moved by to see whether its rank is the usual
+    # Distance [rad, or relative to the mechanism's length] of the nearby position whose rank is compared.
+    1e-2
 )
 MAX_ITERATIONS = 20
-LOOP_CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+LOOP_CLOSURE_TOLERANCE = 1e-10  # relative to the mechanism's length
 
 
 def refuse_unsteady(
     m: TracedMechanism, d: Derivatives, f: Freedoms, point: OperatingPoint, known: dict[str, float]
 ) -> None:
-    """Refuse a motion whose linear equations change while it goes on, or that follow time.
+    """Refuse a motion whose linear equations change with time.
 
-    ``known`` tells the multipliers, and parameters that have other values than their own.
+    ``known`` contains the multipliers, and parameters with other values than their own.
 
     Raises
     ------
@@ -269,14 +273,14 @@ def refuse_unsteady(
 
 
 def _matrix(m: TracedMechanism, d: Derivatives, f: Freedoms, at: dict[str, float]) -> np.ndarray:
-    """A in numbers, in the same coordinates."""
+    """Matrix A in numbers, in the same coordinates."""
     p = d.near(at)
     n = f.Z.shape[1] + f.Zv.shape[1]
     return nominal_values(reduce_linear(m, p, with_bases_of(f, p)).rate[:, :n])
 
 
 def _moved(m: TracedMechanism, at: dict[str, float], v: np.ndarray, h: float) -> None:
-    """A step of Runge and Kutta's along constant velocities."""
+    """Runge-Kutta step along constant velocities."""
     names = [s.data.name for s in m.x.q]
     q = np.array([at[k] for k in names])
 
@@ -293,12 +297,12 @@ def _moved(m: TracedMechanism, at: dict[str, float], v: np.ndarray, h: float) ->
 
 
 def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) -> None:
-    """Refuse a position where the constraints lose rank: nothing linear holds there.
+    """Refuse a position where the constraints lose rank, because no linear model exists there.
 
     Raises
     ------
     ModelError
-        Naming the elements whose rows depend on each other there and not nearby.
+        With the names of the elements whose rows are dependent there and independent nearby.
     """
     which = np.flatnonzero(m.holonomic)
     here = point.numbers(m)
@@ -326,7 +330,7 @@ def _rows(m: TracedMechanism, G: list[Node], at: dict[str, float]) -> np.ndarray
 def _nearby(
     m: TracedMechanism, G: list[Node], at: dict[str, float], step: np.ndarray, which: np.ndarray
 ) -> np.ndarray | None:
-    """Rows at the closed position near a step away; None if none is found."""
+    """Rows at the assembled position nearest to a step; None if assembly fails."""
     names = [s.data.name for s in m.x.q]
     for _ in range(MAX_ITERATIONS):
         T = np.array(evaluate(list(m.x.T.ravel()), at), float).reshape(len(names), -1)
@@ -341,7 +345,7 @@ def _nearby(
 
 
 def _lost(m: TracedMechanism, now: np.ndarray, there: np.ndarray, which: np.ndarray) -> str:
-    """Elements whose rows take part in dependencies that are not there nearby."""
+    """Elements whose rows take part in dependencies that nearby positions do not have."""
     here, span = fundamental_subspaces(now).dependencies, fundamental_subspaces(there).span
     part = np.abs(here @ (here.T @ span)).max(axis=1)
     s = m.values.structure

@@ -1,4 +1,4 @@
-"""Linear equations of a mechanism about an operating point, with expressions of its parameters as entries."""
+"""Linear equations of a mechanism about an operating point, with entries that are expressions of its parameters."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ from .reduction import Freedoms, StateSpaceMatrices, find_freedoms, reduce_linea
 from .stability import StabilityConditions, stability_conditions
 from .transfer_functions import PolynomialPencil, TransferFunction, checked_values, polynomial_pencil
 
-FACTORED = 300  # operations
+FACTORED = 300  # operations up to which entries are factored for display
 
 
 @dataclass
 class LinearEquations(SymbolTable):
     """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the mechanism's parameters.
 
-    The states are changes of as many coordinates as there are freedoms, then changes of their rates, as those of
+    The states are changes of as many coordinates as there are freedoms, then changes of their rates, as in
     `LinearModel`.
 
     Attributes
     ----------
     name : str
     parameters : dict
-        Name -> value of the parameters that have one of their own.
-    matrices : Matrices
-        What the properties tell, as arrays of nodes.
+        Name -> value of the parameters that have their own value.
+    matrices : StateSpaceMatrices
+        The matrices as arrays of nodes.
     conditions : list of Node
-        What has to vanish for the point to be an equilibrium, where it does not by itself: the equations hold for
-        parameters with which it does, and numbers with which it does not are refused.
+        Expressions that must vanish for the point to be an equilibrium. The equations are valid for parameters with
+        which they vanish; other values are refused.
     balanced_by : dict
-        Parameter -> the expression of the others that it stands for, since equilibrium asks for it.
+        Parameter -> expression of the others, solved from the conditions of equilibrium.
     found : tuple of str
-        Coordinates that are numbers at the point, whatever the parameters: loops were closed numerically.
+        Coordinates that are numbers at the point, independent of the parameters: loops were closed numerically.
     """
 
     name: str
@@ -92,43 +92,43 @@ class LinearEquations(SymbolTable):
 
     @property
     def A(self) -> Expressions:
-        """In x' = A x + B u, (n, n)."""
+        """Matrix A of x' = A x + B u, (n, n)."""
         return self._told(self.matrices.A, self.states, self.states)
 
     @property
     def B(self) -> Expressions:
-        """In x' = A x + B u, (n, inputs); errors as `C`."""
+        """Matrix B of x' = A x + B u, (n, inputs); errors as for `C`."""
         return self._proper(self.matrices.B, self.states, self.inputs)
 
     @property
     def C(self) -> Expressions:
-        """In y = C x + D u, (outputs, n).
+        """Matrix C of y = C x + D u, (outputs, n).
 
         Raises
         ------
         AnalysisError
-            If an output follows the rate of an input.
+            If an output depends on the rate of an input.
         """
         return self._proper(self.matrices.C, self.outputs, self.states)
 
     @property
     def D(self) -> Expressions:
-        """In y = C x + D u, (outputs, inputs); errors as `C`."""
+        """Matrix D of y = C x + D u, (outputs, inputs); errors as for `C`."""
         return self._proper(self.matrices.D, self.outputs, self.inputs)
 
     @property
     def mass(self) -> Expressions | None:
-        """M of M a'' + D a' + K a = 0 in the first f states, (f, f); None with constraints on velocities only."""
+        """Matrix M of M a'' + D a' + K a = 0 in the first f states, (f, f); None with velocity constraints."""
         return self._second(self.matrices.mass)
 
     @property
     def damping(self) -> Expressions | None:
-        """D of the same."""
+        """Matrix D of M a'' + D a' + K a = 0; None as for `mass`."""
         return self._second(self.matrices.damping)
 
     @property
     def stiffness(self) -> Expressions | None:
-        """K of the same."""
+        """Matrix K of M a'' + D a' + K a = 0; None as for `mass`."""
         return self._second(self.matrices.stiffness)
 
     def _second(self, X: np.ndarray | None) -> Expressions | None:
@@ -154,37 +154,37 @@ class LinearEquations(SymbolTable):
         return {x.data.name: x for x in symbols_of([n for X in (m.A, m.B, m.C, m.D) for n in X.ravel().tolist()])}
 
     def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, float]:
-        """Values by the names of symbols; refuses those that there are not. What `Expressions` ask."""
+        """Check values by symbol name for `Expressions`; unknown names are refused."""
         return checked_values(self, values)
 
     def values(self, **parameters: float) -> dict[str, np.ndarray]:
-        """A, B, C, D in numbers: with the parameters' own values, or others.
+        """Numerical A, B, C, D with the parameters' own values, or others.
 
         Raises
         ------
         ModelError
-            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
+            If a parameter is unknown or determined by equilibrium, or the point is no equilibrium with it.
         """
         return {k: getattr(self, k).at(parameters).astype(float) + 0.0 for k in "ABCD"}
 
     def eigenvalues(self, **parameters: float) -> np.ndarray:
-        """Of A in numbers, (n,) complex [1/s]."""
+        """Eigenvalues of the numerical A, (n,) complex [1/s]."""
         return np.linalg.eigvals(self.A.at(parameters).astype(float))
 
     def balance(self, **parameters: float) -> dict[str, float]:
-        """Values of the parameters that balance, for values of the others."""
+        """Values of the parameters in ``balanced_by``, for values of the others."""
         told = checked_values(self, parameters)
         found = evaluate(list(self.balanced_by.values()), told)
         return {k: float(x) for k, x in zip(self.balanced_by, found, strict=True)}
 
     @cached_property
     def pencil(self) -> PolynomialPencil:
-        """The same equations as a matrix of polynomials, constraints left in."""
+        """The equations as a matrix of polynomials, with constraints."""
         positive = [k for k, x in self.parameters.items() if x > 0.0]
         return polynomial_pencil(self.mechanics, self.at, self.free, positive)
 
     def transfer_function(self, input: str | None = None, output: str | None = None) -> TransferFunction:
-        """Transfer function with symbolic coefficients; of the only input and output if not named.
+        """Transfer function with symbolic coefficients; of the only input and output by default.
 
         Raises
         ------
@@ -210,12 +210,12 @@ class LinearEquations(SymbolTable):
         )  # fmt: skip
 
     def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
-        """When all eigenvalues have negative real parts, as inequalities in the parameters.
+        """Conditions for negative real parts of all eigenvalues, as inequalities in the parameters.
 
         Parameters
         ----------
         positive : sequence of str, optional
-            What is greater than zero: parameters, and ``"sin(alpha)"`` or the like; all that is now, if not given.
+            Positive quantities: parameters, and ``"sin(alpha)"`` or similar; by default all that are positive now.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class LinearEquations(SymbolTable):
         return out
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people: names, and what equilibrium asks of the parameters."""
+        """Labels and texts of the report: names, and the conditions of equilibrium."""
         x, out = self.matrices, []
         for what, names, units in (
             ("state", x.states, x.state_units),
@@ -243,7 +243,7 @@ class LinearEquations(SymbolTable):
         return out + [("found", f"{name} is a number, so that loops close") for name in self.found]
 
     def _short(self, x: Node) -> Any:
-        """For people: factored, where that is cheap."""
+        """Expression for display: factored, where that is cheap."""
         made = self.printer(x)
         return self.printer.sympy.factor(made) if made.count_ops() < FACTORED else made
 
@@ -251,7 +251,7 @@ class LinearEquations(SymbolTable):
         return "\n".join(f"{a}: {b}" for a, b in self.lines())
 
     def __str__(self) -> str:
-        """The names, and the matrices."""
+        """Names and matrices as text."""
         shown = "A" if self.matrices.improper else "ABCD"
         told = [(k, getattr(self, k)) for k in shown]
         out = [repr(self), *(f"{k} =\n{X}" for k, X in told if X.nodes.size)]
@@ -270,7 +270,7 @@ class LinearEquations(SymbolTable):
         return rf"$\displaystyle \begin{{gathered}} {self.latex()} \end{{gathered}}$"
 
     def index(self, what: str, name: str | None) -> int:
-        """Which input or output that is; the only one if not named."""
+        """Index of an input or output; of the only one if not named."""
         names: tuple[str, ...] = getattr(self, f"{what}s")
         if name is None and len(names) == 1:
             return 0
@@ -281,12 +281,12 @@ class LinearEquations(SymbolTable):
         return names.index(name)
 
 
-REST_TOLERANCE = 1e-12  # [1/s]: slower is rounding
+REST_TOLERANCE = 1e-12  # [1/s]: smaller rates are rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinearizationOptions:
-    """What `linear_equations` is asked; see there."""
+    """Arguments of `linear_equations`."""
 
     inputs: Sequence[str] = ()
     outputs: Sequence[str] = ()
@@ -295,7 +295,7 @@ class LinearizationOptions:
     independent: Sequence[str] = ()
     balanced_by: Sequence[str] = ()
     parameters: Mapping[str, float] | None = None
-    tree: Sequence[str] | None = None  # the tree joints, where they are known
+    tree: Sequence[str] | None = None  # the tree joints, if known
 
 
 def linear_equations(
@@ -311,25 +311,25 @@ def linear_equations(
 ) -> LinearEquations:
     """Linear equations x' = A x + B u, y = C x + D u with the parameters as symbols.
 
-    About an equilibrium, or a motion in which coordinates of joints turn evenly while all others stand still.
+    About an equilibrium, or a motion in which joint coordinates turn at constant rates while all others are constant.
 
     Parameters
     ----------
     inputs, outputs : sequence of str
-        As of `Mechanism.linearize`.
+        As for `Mechanism.linearize`.
     at : Equilibrium, Result or mapping, optional
-        Where. As drawn, if not given: then coordinates are the expressions by which the mechanism is drawn. A mapping
-        gives coordinates, and as ``"A.angle rate"`` their rates: numbers, texts with a unit, expressions of parameters;
-        what it does not give is as drawn, or moved so that loops close. Of an equilibrium, or the end of a motion, the
-        coordinates are numbers.
+        Operating point. By default the reference configuration, with coordinates as the expressions that define it. A
+        mapping gives coordinates, and as ``"A.angle rate"`` their rates: numbers, texts with a unit, expressions of
+        parameters. Coordinates that are not given keep their reference values, or are moved to close loops. At an
+        equilibrium, or the end of a motion, the coordinates are numbers.
     coordinates : {"joint", "absolute"}
-        Those that the equations are made in.
+        Coordinates of the equations.
     independent : sequence of str
-        Coordinates that the states are changes of; chosen by pivoting if not given.
+        Coordinates whose changes are the states; chosen by pivoting if not given.
     balanced_by : sequence of str
-        Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+        Parameters that are solved for so that the point is an equilibrium, as many as there are conditions.
     parameters : mapping, optional
-        Values in place of the model's own, in SI units or with a unit.
+        Values that replace the model's own, in SI units or with a unit.
 
     Raises
     ------
@@ -337,7 +337,7 @@ def linear_equations(
         If a name does not exist, the point cannot be closed, is singular or no equilibrium, or something moves without
         inertia.
     AnalysisError
-        If the linear equations change with time, or an output follows the rate of an input.
+        If the linear equations change with time, or an output depends on the rate of an input.
     """
     if coordinates not in ("joint", "absolute"):
         raise ModelError(f"unknown coordinates {coordinates!r}; choose one of joint, absolute")
@@ -391,19 +391,19 @@ def _names(pairs: Sequence[tuple[Any, Any]]) -> list[tuple[str, Any]]:
 
 
 def _by_velocity(d: Derivatives) -> list[Any]:
-    """G, row by row."""
+    """Entries of G, row by row."""
     rows = slice(*d.ends[2:4])
     columns = np.array([c[rows] for c in d.columns["v"]], object).reshape(len(d.m.x.v), -1)
     return list(columns.T.ravel())
 
 
 def _loads_at_rest(m: TracedMechanism) -> dict[str, float]:
-    """Loads of joints with friction, which are no unknowns any more."""
+    """Values of the loads of joints with friction, which are no unknowns at rest."""
     return {s.data.name: 0.0 for s in m.x.loads}
 
 
 def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMechanism, OperatingPoint]:
-    """The mechanism traced in its coordinates, and the point."""
+    """The traced mechanism and the operating point."""
     if isinstance(o.at, Equilibrium | Result):
         if isinstance(o.at, Equilibrium) and o.at.preload:
             raise ModelError(
@@ -422,7 +422,7 @@ def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMecha
 
 
 def reference_or_given(m: TracedMechanism, at: Mapping[str, Any] | None) -> OperatingPoint:
-    """As drawn where loops close there, else moved."""
+    """The given point, or the reference configuration if its loops are closed; else moved to close them."""
     if not (at is None or isinstance(at, Mapping)):
         raise ModelError(f"at={at!r}: must be a mapping of coordinates, an equilibrium, a result, or None for as drawn")
     return given_point(m, at or {}) if at or len(m.g) else reference_point(m)

@@ -1,7 +1,7 @@
 """The operating point of a linearisation: a state of expressions or numbers.
 
-Equations can be linearised about an equilibrium, or about a motion with constant velocities that looks the same
-at all times (a governor at constant speed, in its joints' coordinates).
+Equations can be linearised about an equilibrium, or about a motion with constant velocities that looks the same at all
+times (in joint coordinates, for example a governor at constant speed).
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from ...tables.forest import tree_joint_steps
 from .derivatives import TracedMechanism
 from .elimination import is_zero, matrix_product, nominal_value, nominal_values, solve_equations
 
-CONSISTENCY_TOLERANCE = 1e-9  # of the largest: velocities that differ by less are the same
+CONSISTENCY_TOLERANCE = 1e-9  # relative difference below which velocities are equal
 
 
 def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[Any]:
-    """Velocities (nv,) with which bodies move as they are told; zero where nothing is.
+    """Velocities (nv,) that give the described velocities of bodies; zero where none are described.
 
     Parameters
     ----------
-    m : Mechanics
-        In joint coordinates.
+    m : TracedMechanism
+        The mechanism in joint coordinates.
     q : sequence of (symbol, expression)
         The position.
 
@@ -70,15 +70,15 @@ def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[
 
 
 def completed_velocities(m: TracedMechanism, at: Sequence[tuple[Node, Any]], v: Sequence[Any]) -> list[Any]:
-    """Velocities that fulfil the constraints: those that are zero are found, where the others ask for it.
+    """Velocities that fulfil the constraints: zero ones are solved for where the constraints require it.
 
     Parameters
     ----------
-    m : Mechanics
+    m : TracedMechanism
     at : sequence of (symbol, expression)
         The position and the time.
     v : sequence
-        Those that are told are not zero.
+        Velocities; described ones are nonzero.
     """
     told = np.array([not is_zero(x) for x in v], bool)
     still = [(s, 0.0) for s in m.x.v]
@@ -101,7 +101,7 @@ def completed_velocities(m: TracedMechanism, at: Sequence[tuple[Node, Any]], v: 
 
 
 def _independent(A: np.ndarray) -> np.ndarray:
-    """Rows that the others depend on."""
+    """Indices of a set of independent rows."""
     from scipy.linalg import qr
 
     if not A.any():
@@ -111,25 +111,27 @@ def _independent(A: np.ndarray) -> np.ndarray:
     return np.sort(order[: int((d > RANK_TOLERANCE * d[0]).sum())])
 
 
-CLOSURE_TOLERANCE = 1e-9  # of the mechanism's length: gaps of a position that is closed
+# Gaps of a closed position, relative to the mechanism's length.
+CLOSURE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 30
 QUARTER = 0.5 * np.pi
-NEW_DIRECTION = 1e-10  # of the mechanism's length: coordinates found by Newton's method
+# Change of a coordinate by Newton's method that counts as none, relative to the mechanism's length.
+NEW_DIRECTION = 1e-10
 
 
 @dataclass
 class OperatingPoint:
-    """A state.
+    """The state of a linearisation.
 
     Attributes
     ----------
     q, v : list
         Coordinates and velocities: nodes or numbers.
     z : list of float
-        Turns of angles, places on curves.
+        Turn counters of angles, curve parameters.
     t : float [s]
     found : tuple of str
-        Coordinates that were found so that the loops close: numbers, whatever the parameters.
+        Coordinates that were computed to close loops: numbers, independent of the parameters.
     """
 
     q: list[Any]
@@ -146,7 +148,7 @@ class OperatingPoint:
         return out | {s.data.name: 0.0 for s in m.vdot}
 
     def replacing(self, m: TracedMechanism) -> list[tuple[Node, Any]]:
-        """What stands in place of the state's symbols, the multipliers not yet."""
+        """Replacements for the symbols of the state, without the multipliers."""
         pairs = [(m.x.t, self.t)]
         for symbols, values in ((m.x.q, self.q), (m.x.v, self.v), (m.x.z, self.z)):
             pairs += zip(symbols, values, strict=True)
@@ -154,7 +156,7 @@ class OperatingPoint:
         return pairs + [(s, 0.0) for s in m.vdot]
 
     def _quarters(self, m: TracedMechanism) -> list[tuple[Node, Any]]:
-        """Sines and cosines of whole quarters of a turn, which are no rounded numbers."""
+        """Exact sines and cosines of multiples of a right angle."""
         out: list[tuple[Node, Any]] = []
         for s, x in zip(m.x.q, self.q, strict=True):
             if isinstance(x, int | float) or x.known:
@@ -166,7 +168,7 @@ class OperatingPoint:
 
 
 def reference_point(m: TracedMechanism) -> OperatingPoint:
-    """As drawn, with the rates that are told of tree joints' coordinates and the velocities told of free bodies."""
+    """Reference configuration, with the described rates of tree joints and velocities of free bodies."""
     x, n = m.values, m.values.structure
     q, v = x.q.tolist(), x.v.tolist()
     z = compile_mechanism(m.model, tree=n.tree, coupled=bool(n.tree)).z.real.tolist()
@@ -188,7 +190,7 @@ def reference_point(m: TracedMechanism) -> OperatingPoint:
 
 
 def _initial_condition(m: TracedMechanism, e: Initial) -> list[tuple[str, Any]]:
-    """What an initial condition says of a coordinate and of its rate, by their names; None where it says nothing."""
+    """(name, value) of a coordinate and of its rate in an initial condition; None if not given."""
     unit = m.model.unit(e.name, e)
     every = ((e.name, e.value, unit, "value"), (f"{e.name} rate", e.rate, f"{unit}/s", "rate"))
     env = m.values.env
@@ -197,7 +199,7 @@ def _initial_condition(m: TracedMechanism, e: Initial) -> list[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class StateEntry:
-    """Where a named coordinate or rate stands: value = x + offset."""
+    """Index of a named coordinate or rate in the state: value = x + offset."""
 
     k: int
     rate: bool
@@ -205,7 +207,7 @@ class StateEntry:
 
 
 def state_entries(m: TracedMechanism) -> dict[str, StateEntry]:
-    """What may be given of a state: coordinates and, as ``"A.angle rate"``, their rates."""
+    """Names that may be given for a state: coordinates and, as ``"A.angle rate"``, their rates."""
     s, S = m.values.structure, m.x.system
     out: dict[str, StateEntry] = {}
     for t, row, step in tree_joint_steps(s):
@@ -223,7 +225,7 @@ def state_entries(m: TracedMechanism) -> dict[str, StateEntry]:
 
 
 def _coordinate_of_velocity(m: TracedMechanism, d: int) -> int:
-    """The coordinate whose rate a velocity is; -1 for turns in space."""
+    """Index of the coordinate whose rate a velocity is; -1 for angular velocities in space."""
     column = [k for k in range(len(m.x.q)) if m.x.T[k, d] != 0.0]
     return column[0] if len(column) == 1 and m.x.T[column[0], d] == 1.0 else -1
 
@@ -236,7 +238,7 @@ def _set_entry(q: list[Any], v: list[Any], p: StateEntry, value: Any) -> None:
 
 
 def given_point(m: TracedMechanism, at: Mapping[str, Any]) -> OperatingPoint:
-    """As drawn, but with coordinates and rates that are given: numbers, texts with a unit, expressions of parameters.
+    """Reference configuration with given coordinates and rates: numbers, texts with a unit, expressions of parameters.
 
     Raises
     ------
@@ -262,7 +264,7 @@ def given_point(m: TracedMechanism, at: Mapping[str, Any]) -> OperatingPoint:
 def closed_point(
     m: TracedMechanism, point: OperatingPoint, fixed: Sequence[int], at: Mapping[str, Any]
 ) -> OperatingPoint:
-    """With loops closed, by Newton's method in the coordinates that were not given; rates likewise.
+    """Close the loops by Newton's method in the coordinates that were not given; likewise their rates.
 
     Raises
     ------
@@ -300,7 +302,7 @@ def closed_point(
 
 
 def _functions(m: TracedMechanism, which: np.ndarray) -> tuple[list[Any], list[Any]]:
-    """G of the constraints on positions and T, to be evaluated."""
+    """Expressions of the position constraints' G, and of T."""
     return list(jacobian(list(m.n[which]), m.x.v).ravel()), list(m.x.T.ravel())
 
 
@@ -309,12 +311,12 @@ def _moves(m: TracedMechanism, d: int, fixed: Sequence[int]) -> bool:
 
 
 def _with_rates(m: TracedMechanism, point: OperatingPoint) -> OperatingPoint:
-    """With rates that the constraints ask for.
+    """Complete the rates so that they fulfil the constraints.
 
     Raises
     ------
     ModelError
-        If they allow none.
+        If the constraints allow none.
     """
     if not len(m.n):
         return point

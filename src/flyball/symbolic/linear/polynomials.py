@@ -1,8 +1,8 @@
 """Polynomials in s and in the parameters: exact sums and products, determinants, common factors, signs.
 
-What is not a polynomial (sines, roots, functions known by name) becomes a generator of its own; sines and cosines
-of sums are expanded, and squares that equal something else (sin^2, roots) are replaced. Determinants are expanded
-by minors, each computed once.
+What is not a polynomial (sines, roots, functions known by name) becomes a generator. Sines and cosines of sums are
+expanded, and squares with a known value (sin^2, roots) are replaced. Determinants are expanded by minors, each computed
+once.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ from ...expression_graph.graph import Graph, Node
 from ...expression_graph.printers.sympy import MAX_DENOMINATOR, SympyPrinter, fraction
 from .elimination import nominal_value
 
-MAX_TERMS_OF_ENTRY = 4000  # operations in the entries of a matrix
-ROUNDING_TOLERANCE = 1e-12  # part of the largest term of a polynomial below which one with a long number is rounding
+MAX_TERMS_OF_ENTRY = 4000  # largest number of operations in the entries of a matrix
+# Terms with a long number below this part of the largest term of a polynomial are rounding.
+ROUNDING_TOLERANCE = 1e-12
 
 
 class PolynomialRing:
-    """The polynomials that the entries of some matrices are made of.
+    """Polynomial ring of the entries of some matrices.
 
     Parameters
     ----------
     matrices : sequence of ndarray
-        Of nodes or numbers.
+        Matrices of nodes or numbers.
     what : str
-        Whose they are, for messages.
+        Owner of the matrices, for messages.
     positive : collection of str
-        Parameters that are greater than zero, so that a root of their square is theirs.
+        Positive parameters, for which the root of the square is the parameter.
 
     Raises
     ------
@@ -46,9 +47,10 @@ class PolynomialRing:
         if count > MAX_TERMS_OF_ENTRY:
             raise ModelError(
                 f"the linear equations of {what} have {count} operations in their coefficients, and transfer functions "
-                f"with symbols are found up to {MAX_TERMS_OF_ENTRY}: ask for numbers (linearize), or give numbers for parameters"
+                f"with symbols are found up to {MAX_TERMS_OF_ENTRY}: ask for numbers (linearize), or give numbers for "
+                f"parameters"
             )
-        self.graph = next((x.graph for x in flat if isinstance(x, Node)), None) or Graph()  # where expressions live
+        self.graph = next((x.graph for x in flat if isinstance(x, Node)), None) or Graph()  # graph of the expressions
         self.printer = SympyPrinter(positive=positive)
         self.sympy = sp = self.printer.sympy
         self.s = sp.Symbol("s")
@@ -63,7 +65,7 @@ class PolynomialRing:
             at += X.size
 
     def _tidy(self, x: Any) -> Any:
-        """Numbers as roots where they are, roots of squares taken, sines of sums expanded."""
+        """Write numbers as roots where they are, take roots of squares, expand sines of sums."""
         sp = self.sympy
         x = sp.sympify(x)
         if x.has(sp.Float):
@@ -73,12 +75,12 @@ class PolynomialRing:
         return x.replace(lambda e: e.is_Pow and e.exp.is_Rational and e.exp.q == 2, self._root)
 
     def _root(self, x: Any) -> Any:
-        """An odd power of a root: of a base in which sines and cosines are one where they can be."""
+        """Odd power of a root, with sines and cosines in the base unified where possible."""
         sp = self.sympy
         return sp.sqrt(sp.factor(sp.trigsimp(sp.together(x.base)))) ** (2 * x.exp)
 
     def _exact(self, x: Any) -> Any:
-        """A number as the root of a short fraction, if it is one; else by its digits."""
+        """A number as the root of a short fraction, if it is one; else as a decimal."""
         sp = self.sympy
         value = float(x)
         square = fraction(value * value)
@@ -88,7 +90,7 @@ class PolynomialRing:
         return sp.Rational(repr(value))
 
     def _elements(self, texts: Sequence[Any]) -> tuple[Any, list[Any], list[Any]]:
-        """The field of fractions, what squares stand for, and the entries as its elements."""
+        """The field of fractions, replacements for squares, and the entries as field elements."""
         sp = self.sympy
         squares = self._squares(texts)
         extra = [x for pair in squares for x in pair]
@@ -103,7 +105,7 @@ class PolynomialRing:
         return field.ring, relations, found[:at]
 
     def _kernels(self, texts: Sequence[Any]) -> list[Any]:
-        """Generators besides symbols: roots first, then functions."""
+        """Generators other than symbols: roots first, then functions."""
         sp = self.sympy
         roots: dict[Any, None] = {}
         functions: dict[Any, None] = {}
@@ -121,7 +123,7 @@ class PolynomialRing:
         return [*deepest, *sorted(functions, key=by_name)]
 
     def _order(self, texts: Sequence[Any]) -> list[Any]:
-        """Generators, those first that stand for more."""
+        """Generators in order; composed ones first."""
         sp = self.sympy
         kernels = self._kernels(texts)
         symbols = {y for x in texts for y in x.free_symbols} | {y for k in kernels for y in k.free_symbols}
@@ -129,7 +131,7 @@ class PolynomialRing:
         return [self.s, *kernels, *sorted(symbols, key=lambda y: y.name), *numbers_]
 
     def _squares(self, texts: Sequence[Any]) -> list[tuple[Any, Any]]:
-        """(generator, what its square is): roots, and sines."""
+        """(generator, value of its square) of roots and sines."""
         sp = self.sympy
         out = []
         for e in self._kernels(texts):
@@ -142,7 +144,7 @@ class PolynomialRing:
     # -- polynomials
 
     def reduced(self, p: Any) -> Any:
-        """A polynomial without squares of generators that stand for something else."""
+        """Replace squares of generators that have a known value."""
         for generator, square in self.relations:
             k = self.ring.gens.index(generator)
             top = max((m[k] for m in p.itermonoms()), default=0)
@@ -158,7 +160,7 @@ class PolynomialRing:
         return p
 
     def forms(self, p: Any) -> list[Any]:
-        """The same polynomial with even powers of cosines, or of sines, of each angle."""
+        """Equal polynomials with even powers of cosines, or of sines, for each angle."""
         out = [p]
         for sine, square in self.relations:
             if square.denom != 1 or max((m[0] for m in square.numer.itermonoms()), default=0):
@@ -169,7 +171,7 @@ class PolynomialRing:
         return out
 
     def _cosine(self, sine: Any) -> int | None:
-        """Which generator is the cosine of the same angle."""
+        """Index of the generator that is the cosine of the same angle; None if there is none."""
         x = sine.as_expr()
         if not isinstance(x, self.sympy.sin):
             return None
@@ -183,24 +185,24 @@ class PolynomialRing:
         return out
 
     def cleared(self, row: Sequence[Any]) -> list[Any]:
-        """A row of fractions as polynomials: times what clears their denominators."""
+        """A row of fractions as polynomials, multiplied by their common denominator."""
         common = self.ring.one
         for x in row:
             common = common.lcm(x.denom)
         return [self.reduced(x.numer * common.exquo(x.denom)) for x in row]
 
     def value(self, generator: Any) -> float:
-        """Of a generator, with the parameters' own values."""
+        """Value of a generator with the parameters' own values."""
         (node,) = self.printer.back([generator], self.graph)
         return nominal_value(node)
 
     def number(self, p: Any) -> float:
-        """Of a polynomial without s, with the parameters' own values."""
+        """Value of a polynomial without s, with the parameters' own values."""
         (node,) = self.printer.back([p.as_expr()], self.graph)
         return nominal_value(node)
 
     def by_powers(self, p: Any) -> list[Any]:
-        """Coefficients of s, the highest power first; each without its rounding."""
+        """Coefficients of the powers of s, the highest first, without rounding terms."""
         degree = max((m[0] for m in p.itermonoms()), default=0)
         parts = [self.ring.zero for _ in range(degree + 1)]
         for m, c in p.iterterms():
@@ -208,10 +210,10 @@ class PolynomialRing:
         return [self._sound(x) for x in parts]
 
     def _sound(self, p: Any) -> Any:
-        """Without terms that rounding left: with long numbers that are nothing beside the others.
+        """Remove rounding terms: those with long numbers that are small compared with the others.
 
-        Nothing with the parameters' own values (one, where that is zero) either: a coefficient of other parameters has
-        another unit.
+        They must also be negligible with the parameters' own values (1 for zeros), since coefficients of different
+        parameters have different units.
         """
         long = [c for c in p.itercoeffs() if c.denominator > MAX_DENOMINATOR**2]
         if not long:
@@ -230,7 +232,7 @@ class PolynomialRing:
 
 
 def cancel_common_factors(ring: PolynomialRing, num: Any, den: Any) -> tuple[Any, Any, Any]:
-    """(numerator, denominator, what they had in common as a SymPy expression in s, without factors that have none)."""
+    """Cancel common factors: (numerator, denominator, common factor in s as a SymPy expression)."""
     common = num.gcd(den) if num else den
     num, den = num.exquo(common), den.exquo(common)
     _, s_part = common.as_expr(), ring.sympy.Integer(1)
@@ -241,12 +243,12 @@ def cancel_common_factors(ring: PolynomialRing, num: Any, den: Any) -> tuple[Any
 
 
 def readable_coefficients(ring: PolynomialRing, p: Any) -> list[Any]:
-    """Of the powers of s, the highest first, factored, as SymPy expressions."""
+    """Coefficients of the powers of s, the highest first, factored, as SymPy expressions."""
     return [readable_polynomial(ring, x) for x in ring.by_powers(p)]
 
 
 def readable_polynomial(ring: PolynomialRing, p: Any) -> Any:
-    """A polynomial as a SymPy expression: whichever of its forms with sines or cosines has fewer terms, factored."""
+    """A polynomial as a factored SymPy expression, in the form with sines or cosines that has fewer terms."""
     sp = ring.sympy
     forms = [ring.ring.one * x for x in ring.forms(p)]
     fewest = min(forms, key=lambda x: (len(x.factor_list()[1][-1][0]) if x.factor_list()[1] else 0, len(x)))
@@ -259,7 +261,7 @@ def readable_polynomial(ring: PolynomialRing, p: Any) -> Any:
 
 
 def _factored_product(sp: Any, p: Any) -> Any:
-    """Its factors, each with a positive first term."""
+    """Factored polynomial; each factor has a positive first term."""
     constant, factors = p.factor_list()
     out = []
     for f, k in factors:
@@ -277,7 +279,7 @@ def _short_fractions(sp: Any, x: Any) -> Any:
 
 
 def scale_fraction(ring: PolynomialRing, num: Any, den: Any) -> tuple[Any, Any]:
-    """Without the common rational factor, and the denominator's highest coefficient positive with the own values."""
+    """Remove the common rational factor and make the denominator's highest coefficient positive."""
     first = ring.by_powers(den)[0]
     lead = first.LC
     sign = 1 if ring.number(first) > 0.0 else -1
@@ -287,7 +289,7 @@ def scale_fraction(ring: PolynomialRing, num: Any, den: Any) -> tuple[Any, Any]:
 
 
 def _content(numbers: Sequence[Any]) -> Any:
-    """The greatest common divisor of fractions that makes them short whole numbers; 0 if there is none."""
+    """Greatest common divisor of fractions that makes them short integers; 0 if there is none."""
     from math import gcd, lcm
 
     above, below = 0, 1
@@ -299,22 +301,22 @@ def _content(numbers: Sequence[Any]) -> Any:
     return type(next(iter(numbers)))(above) / below
 
 
-MAX_ORDER = 24  # rows
-MAX_TERMS = 20_000  # of a polynomial
+MAX_ORDER = 24  # largest number of rows
+MAX_TERMS = 20_000  # largest number of terms of a polynomial
 
 
 def determinant(rows: Sequence[Sequence[Any]], ring: Any, what: str) -> Any:
     """Determinant of a matrix of polynomials.
 
-    Expanded by rows, those with few entries first; minors that come again are known. Nothing is divided, so no
-    coefficient grows beyond those of the minors themselves.
+    Expanded by rows, those with few entries first; repeated minors are computed once. Without division no coefficient
+    grows beyond those of the minors.
 
     Parameters
     ----------
     rows : sequence (n) of sequences (n) of polynomials
-    ring : Ring
+    ring : PolynomialRing
     what : str
-        Whose it is, for messages.
+        Owner of the matrix, for messages.
 
     Raises
     ------
@@ -347,8 +349,8 @@ def determinant(rows: Sequence[Sequence[Any]], ring: Any, what: str) -> Any:
             if len(found) > MAX_TERMS:
                 raise ModelError(
                     f"the determinant of the linear equations of {what} has minors of {len(found)} terms, and "
-                    f"transfer functions with symbols are found up to {MAX_TERMS}: give numbers for some parameters, or "
-                    f"ask for numbers (linearize)"
+                    f"transfer functions with symbols are found up to {MAX_TERMS}: give numbers for some parameters, "
+                    f"or ask for numbers (linearize)"
                 )
         return found
 
@@ -371,7 +373,7 @@ def is_odd_permutation(order: Sequence[int]) -> bool:
 
 
 class SignAnalysis:
-    """Which polynomials are greater than zero because all that is in them is."""
+    """Detection of polynomials that are positive because all their terms are."""
 
     def __init__(self, ring: PolynomialRing, positive: Sequence[str] | None) -> None:
         self.ring, sp = ring, ring.sympy
@@ -383,7 +385,7 @@ class SignAnalysis:
         self.used: dict[Any, None] = {}
 
     def split(self, p: Any) -> tuple[int, list[Any]]:
-        """(sign, factors whose sign is not known) of a polynomial; (0, []) of zero."""
+        """(sign, factors of unknown sign) of a polynomial; (0, []) of zero."""
         if not p:
             return 0, []
         constant, factors = p.factor_list()
@@ -399,12 +401,12 @@ class SignAnalysis:
         return sign, rest
 
     def known_of(self, p: Any) -> int:
-        """1 or -1 if the product of its factors is known to be greater or less than zero; else 0."""
+        """1 or -1 if the product of the factors is known to be positive or negative; else 0."""
         sign, rest = self.split(p)
         return 0 if rest else sign
 
     def sign(self, p: Any) -> int:
-        """1 or -1 if all terms have it, with sines or with cosines of the same angle; else 0."""
+        """1 or -1 if all terms have this sign, with sines or with cosines of the same angle; else 0."""
         if self._within_one(p):
             return 1 if p.evaluate([(g, 0) for g in self.ring.ring.gens]) > 0 else -1
         for x in self.ring.forms(p):
@@ -419,12 +421,12 @@ class SignAnalysis:
         if len(signs) > 1 or not all(self.known[k] for k in used):
             return 0
         if all(any(e and not e % 2 and not self.known[k] for k, e in enumerate(m[1:])) for m in p.itermonoms()):
-            return 0  # squares of what may be zero, and nothing else
+            return 0  # only squares of factors that may be zero
         self.used |= {self.ring.ring.gens[k + 1].as_expr(): None for k in used}
         return signs.pop()
 
     def _within_one(self, p: Any) -> bool:
-        """Whether it is 1 + cos or 1 - cos, or the reverse, of an angle whose sine is not zero."""
+        """Whether p is 1 + cos or 1 - cos, or the negative, of an angle whose sine is not zero."""
         sp, x = self.ring.sympy, p.as_expr()
         angles = [c for c in x.atoms(sp.cos) if sp.expand(x - c) in (1, -1) or sp.expand(x + c) in (1, -1)]
         gens = [g.as_expr() for g in self.ring.ring.gens[1:]]
@@ -437,7 +439,7 @@ class SignAnalysis:
 
 
 def inequality_sides(ring: PolynomialRing, signs: SignAnalysis, p: Any) -> tuple[Any, Any]:
-    """p > 0 as (what is greater, what is smaller), both greater than zero where that is known of them; else (p, 0)."""
+    """Write p > 0 as (left, right) with left > right, both positive if their signs are known; else (p, 0)."""
     gens = ring.ring.gens
     for k in range(1, len(gens)):
         if max(m[k] for m in p.itermonoms()) == 1:

@@ -1,6 +1,6 @@
 """Elimination of the constraints from linear equations, and the matrices A, B, C, D.
 
-With x a change of position, u = x' - N x one of velocity, l of the multipliers and w of the inputs,
+With the changes x of position, u = x' - N x of velocity, l of the multipliers and w of the inputs,
 
     M u' + D u + K x + R l + r_w w = 0,    G x + g_w w = 0,    G u + V x + n_w w + g_w w' = 0,
 
@@ -25,22 +25,22 @@ from ...numerics.rank import RANK_TOLERANCE, null_space, rank
 from .derivatives import Perturbed, TracedMechanism
 from .elimination import DependentEquations, is_zero, matrix_product, nominal_values, solve_equations
 
-ROUNDING_TOLERANCE = 1e-13  # part of the largest row below which one is what rounding left of none
+ROUNDING_TOLERANCE = 1e-13  # rows below this part of the largest are rounding
 
 
 @dataclass
 class Freedoms:
-    """Freedoms.
+    """Free coordinates at a point, and independent constraints.
 
     Attributes
     ----------
     Z, Zv : ndarray (nv, f), (nv, fv)
-        Bases of the changes of positions, and of velocities, that the constraints allow: the identity in the rows
+        Bases of the changes of positions and velocities that the constraints allow, with the identity in the rows
         ``chosen`` and ``chosen_v``.
     rows, rows_v : ndarray of int
-        Independent constraints on positions, and of all; the others follow from these.
+        Independent constraints on positions, and among all constraints; the others follow from these.
     held : ndarray of int
-        Coordinates that mean nothing: turns of point masses.
+        Rotations of point masses, which are fixed.
     """
 
     Z: np.ndarray
@@ -53,12 +53,12 @@ class Freedoms:
 
 
 def find_freedoms(m: TracedMechanism, p: Perturbed, requested: Sequence[str] = ()) -> Freedoms:
-    """Freedoms at a point; ``requested`` names the coordinates that tell the others.
+    """Freedoms at a point; ``requested`` names the independent coordinates.
 
     Raises
     ------
     ModelError
-        If the wanted coordinates do not tell the others.
+        If the requested coordinates do not determine the others.
     """
     G = p.by["nv"]
     held = _massless_velocities(p)
@@ -72,7 +72,7 @@ def find_freedoms(m: TracedMechanism, p: Perturbed, requested: Sequence[str] = (
 
 
 def with_bases_of(f: Freedoms, p: Perturbed) -> Freedoms:
-    """The same coordinates and rows with the bases of another state."""
+    """The same free coordinates and rows, with the bases of another state."""
     G = p.by["nv"]
     return replace(f, Z=_basis(G, f.rows, f.chosen, f.held), Zv=_basis(G, f.rows_v, f.chosen_v, f.held))
 
@@ -86,7 +86,7 @@ def _indices(m: TracedMechanism, requested: Sequence[str]) -> np.ndarray | None:
 
 
 def scaled_rows(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Values of rows, of unit size, turns counted in lengths."""
+    """Values of rows scaled to unit norm, rotations scaled to lengths."""
     A = nominal_values(G) * scale
     size = np.sqrt((A * A).sum(axis=1))
     least = ROUNDING_TOLERANCE * size.max(initial=0.0)
@@ -96,7 +96,7 @@ def scaled_rows(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def _chosen(
     m: TracedMechanism, G: np.ndarray, which: np.ndarray, held: np.ndarray, requested: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates that tell the others, and independent rows."""
+    """Independent coordinates and independent rows."""
     from scipy.linalg import qr
 
     still = np.eye(len(m.names))[held]
@@ -118,7 +118,7 @@ def _chosen(
 
 
 def _basis(G: np.ndarray, rows: np.ndarray, chosen: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """The identity in the chosen rows; the others as the constraints say."""
+    """Basis with the identity in the chosen rows; the other rows follow from the constraints."""
     nv = G.shape[1]
     others = np.setdiff1d(np.arange(nv), np.r_[chosen, held])
     Z = zero_objects(nv, len(chosen))
@@ -136,7 +136,8 @@ def _massless_velocities(p: Perturbed) -> np.ndarray:
 
 
 IMPROPER_TOLERANCE = (
-    1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
+    # Dependence of an output on an input's rate below this part of its total dependence is rounding.
+    1e-12
 )
 
 
@@ -147,9 +148,9 @@ class ReducedLinearEquations:
     Attributes
     ----------
     rate : ndarray (n, n + 3 m)
-        s'.
+        s' as a linear function of the columns.
     position, velocity, acceleration, multipliers : ndarray
-        Changes of everything.
+        Changes of all positions, velocities, accelerations and multipliers.
     M, D, K : ndarray (f, f) or None
         M a'' + D a' + K a = 0, where all constraints are on positions.
     """
@@ -165,12 +166,12 @@ class ReducedLinearEquations:
 
 
 def reduce_linear(m: TracedMechanism, p: Perturbed, f: Freedoms) -> ReducedLinearEquations:
-    """Take the constraints out.
+    """Eliminate the constraints.
 
     Raises
     ------
     ModelError
-        If something free moves without inertia.
+        If a free motion has no inertia.
     """
     by, nv, k = p.by, len(m.names), len(m.inputs)
     na, nb = f.Z.shape[1], f.Zv.shape[1]
@@ -222,7 +223,7 @@ def _sum(*parts: np.ndarray) -> np.ndarray:
 
 
 def _clean(A: np.ndarray) -> np.ndarray:
-    """Zeros where there are no expressions."""
+    """Replace identically zero expressions by 0."""
     out = zero_objects(*A.shape)
     for at, x in np.ndenumerate(A):
         if not is_zero(x):
@@ -240,7 +241,7 @@ def _dependent(rows: np.ndarray, chosen: np.ndarray, held: np.ndarray, G: np.nda
 
 
 def _left_null_space(f: Freedoms, R: np.ndarray) -> np.ndarray:
-    """Y, the identity in the chosen rows, with Y^T R = 0."""
+    """Matrix Y with Y^T R = 0 and the identity in the chosen rows."""
     Y = zero_objects(*f.Zv.shape)
     Y[f.chosen_v, np.arange(len(f.chosen_v))] = 1.0
     rest = np.setdiff1d(np.arange(len(Y)), np.r_[f.chosen_v, f.held])
@@ -250,7 +251,7 @@ def _left_null_space(f: Freedoms, R: np.ndarray) -> np.ndarray:
 
 
 def improper_output(parts: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[int, int, str] | None:
-    """Which output follows the rate of which input, if one does: from its parts by inputs and their rates."""
+    """(output, input, rate) of an output that depends on the rate of an input; None if there is none."""
     D, D1, D2 = (nominal_values(x) for x in parts)
     size = np.abs(D) + np.abs(D1) + np.abs(D2) + np.abs(nominal_values(parts[0])).max(initial=0.0)
     for rate, part in (("rate", D1), ("second rate", D2)):
@@ -262,12 +263,12 @@ def improper_output(parts: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[i
 
 @dataclass
 class StateSpaceMatrices:
-    """Arrays of objects: nodes or numbers.
+    """State space matrices as arrays of nodes or numbers.
 
     Attributes
     ----------
     improper : str
-        Why there are no B, C and D: an output follows the rate of an input; else empty.
+        Reason why there are no B, C and D: an output depends on the rate of an input; else empty.
     """
 
     states: tuple[str, ...]
@@ -289,7 +290,7 @@ class StateSpaceMatrices:
 def state_space_matrices(
     m: TracedMechanism, p: Perturbed, f: Freedoms, r: ReducedLinearEquations, outputs: Sequence[tuple[str, str]]
 ) -> StateSpaceMatrices:
-    """Of the reduced equations, in the state in which rates of inputs do not appear; ``outputs``: names and units."""
+    """Matrices for the state in which rates of inputs are eliminated; ``outputs``: names and units."""
     k, n = len(m.inputs), len(r.rate)
     y = _outputs(p, r, n, k)
     A, (B, B1, B2) = r.rate[:, :n], _parts(r.rate, n, k)
@@ -330,12 +331,12 @@ def _replaced(X: np.ndarray, pairs: Sequence[tuple[Node, float]]) -> np.ndarray:
 
 
 def _parts(x: np.ndarray, n: int, k: int) -> list[np.ndarray]:
-    """Columns of the inputs, of their first and of their second rates."""
+    """Columns of the inputs, of their first rates and of their second rates."""
     return [x[:, n + i * k : n + (i + 1) * k] for i in range(3)]
 
 
 def _outputs(p: Perturbed, r: ReducedLinearEquations, n: int, k: int) -> np.ndarray:
-    """Outputs by the states, the inputs and their rates, (outputs, n + 3 k)."""
+    """Derivatives of the outputs by the states, the inputs and their rates, (outputs, n + 3 k)."""
     y = matrix_product(p.by["yx"], r.position) + matrix_product(p.by["yv"], r.velocity)
     y = y + matrix_product(p.by["ya"], r.acceleration) + matrix_product(p.by["yl"], r.multipliers)
     y[:, n : n + k] = y[:, n : n + k] + p.by["yw"]

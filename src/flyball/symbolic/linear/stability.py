@@ -1,10 +1,9 @@
-"""Routh's and Hurwitz's conditions of stability as inequalities in the parameters.
+"""Routh and Hurwitz conditions of stability as inequalities in the parameters.
 
-Conditions are those of Lienard and Chipart (1914; Gantmacher, Theory of Matrices, vol. 2, XV, section 13): with
+The conditions are those of Lienard and Chipart (1914; Gantmacher, Theory of Matrices, vol. 2, XV, section 13). With
 a_0 > 0 in a_0 s^n + ... + a_n all roots have negative real parts if and only if every second coefficient from a_n
-down is greater than zero (or a_n, and every second from a_n-1 down) and every second of Hurwitz's determinants,
-from the last but one down. The characteristic polynomial is factored first: each factor has to fulfil its own
-conditions.
+down is positive (or a_n, and every second from a_n-1 down) and every second Hurwitz determinant, from the last but one
+down. The characteristic polynomial is factored first: each factor must fulfil its own conditions.
 """
 
 from __future__ import annotations
@@ -24,24 +23,24 @@ from .transfer_functions import checked_values
 
 @dataclass
 class StabilityConditions:
-    """When all eigenvalues have negative real parts, as inequalities in the parameters.
+    """Conditions for negative real parts of all eigenvalues, as inequalities in the parameters.
 
     Attributes
     ----------
     name : str
     conditions : tuple of sympy relations
-        All have to hold. Factors that are greater than zero are left out; ``sympy.false`` where nothing can make it
-        stable (no damping).
+        All must hold. Positive factors are left out; ``sympy.false`` if no parameters make it stable (no
+        damping).
     positive : tuple of sympy.Expr
-        What is taken for greater than zero in that.
+        Quantities assumed to be positive.
     factors : tuple of tuple of sympy.Expr
         Coefficients of the factors of the characteristic polynomial, the highest power first.
     zeros : int
-        Eigenvalues that are zero for all parameters, and left out: coordinates on which nothing depends.
+        Number of eigenvalues that are zero for all parameters and left out: coordinates on which nothing depends.
     parameters : dict
         Name -> value.
     balanced_by : dict
-        Parameter -> the expression that it stands for.
+        Parameter -> expression of the others, solved from the conditions of equilibrium.
     """
 
     name: str
@@ -51,27 +50,27 @@ class StabilityConditions:
     zeros: int
     parameters: dict[str, float]
     balanced_by: dict[str, Node] = field(default_factory=dict)
-    nodes: list[list[Node]] = field(default_factory=list, repr=False)  # of the factors
-    told: list[Node] = field(default_factory=list, repr=False)  # left sides of the conditions
+    nodes: list[list[Node]] = field(default_factory=list, repr=False)  # coefficients of the factors
+    told: list[Node] = field(default_factory=list, repr=False)  # left-hand sides of the conditions
     validity: Validity = field(default=Validity(), repr=False)
 
     def holds(self, **parameters: float) -> bool:
-        """Whether it is stable with the parameters' own values, or others; eigenvalues that are always zero aside.
+        """Whether it is stable with the parameters' own values, or others; identically zero eigenvalues are ignored.
 
         Raises
         ------
         ModelError
-            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
+            If a parameter is unknown or determined by equilibrium, or the point is no equilibrium with it.
         """
         values = checked_values(self, parameters)
         return all(is_hurwitz(np.array(evaluate(a, values), float)) for a in self.nodes)
 
     def left_sides(self, **parameters: float) -> list[float]:
-        """What the conditions ask to be greater than zero, in numbers."""
+        """Values of the expressions that must be positive."""
         return [float(x) for x in evaluate(self.told, checked_values(self, parameters))]
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people."""
+        """Labels and texts of the report."""
         out = [("stable if", str(c)) for c in self.conditions] or [("stable", "always")]
         if any(c == False for c in self.conditions):  # noqa: E712 - SymPy's
             out = [("stable", "never: nothing takes the energy of some motions away, or something drives them")]
@@ -114,17 +113,17 @@ def stability_conditions(
     parameters: tuple[dict[str, float], dict[str, Node]],
     positive: Sequence[str] | None,
 ) -> StabilityConditions:
-    """Conditions for all roots of a polynomial in s, but those at zero, to have negative real parts.
+    """Conditions for negative real parts of all roots of a polynomial in s, except zero roots.
 
     Parameters
     ----------
-    ring : Ring
+    ring : PolynomialRing
     p : polynomial
     name : str
     parameters : (dict, dict)
-        Values of the parameters, and those that equilibrium tells.
+        Values of the parameters, and expressions of those determined by equilibrium.
     positive : sequence of str, optional
-        Parameters that are greater than zero; all that are now if not given.
+        Positive parameters; by default all that are positive now.
     """
     signs = SignAnalysis(ring, positive)
     zeros, factors = 0, []
@@ -157,7 +156,7 @@ def stability_conditions(
 
 
 def _conditions(ring: PolynomialRing, signs: SignAnalysis, a: list[Any], name: str) -> list[Any]:
-    """Polynomials that have to be greater than zero."""
+    """Polynomials that must be positive."""
     n = len(a) - 1
     minors = [_minor(ring, a, k, name) for k in range(n - 1, 1, -2)]
     choices = []
@@ -173,7 +172,7 @@ def _conditions(ring: PolynomialRing, signs: SignAnalysis, a: list[Any], name: s
 
 
 def _required_conditions(ring: PolynomialRing, signs: SignAnalysis, x: Any) -> list[Any]:
-    """What has to be greater than zero for a polynomial to be; zero where it never is."""
+    """Factors that must be positive for a polynomial to be positive; zero if it never is."""
     sign, rest = signs.split(x)
     if sign == 0 or (sign < 0 and not rest):
         return [ring.ring.zero]
@@ -187,12 +186,12 @@ def _required_conditions(ring: PolynomialRing, signs: SignAnalysis, x: Any) -> l
 
 
 def has_short_numbers(p: Any) -> bool:
-    """Whether the numbers in a polynomial are."""
+    """Whether the numbers in a polynomial are short."""
     return all(len(str(c.numerator)) + len(str(c.denominator)) < 12 for c in p.itercoeffs())
 
 
 def _minor(ring: PolynomialRing, a: list[Any], k: int, name: str) -> Any:
-    """Hurwitz's determinant of k rows."""
+    """Hurwitz determinant of k rows."""
     zero = ring.ring.zero
     rows = [[a[2 * (j + 1) - (i + 1)] if 0 <= 2 * (j + 1) - (i + 1) < len(a) else zero for j in range(k)]
             for i in range(k)]  # fmt: skip

@@ -1,11 +1,11 @@
 """Transfer functions whose coefficients are expressions of the parameters, by Cramer's rule without division.
 
-With x(s) the changes of positions, u = (s - N) x those of velocities, l of the multipliers, w of the inputs,
+With the changes x(s) of positions, u = (s - N) x of velocities, l of the multipliers, w of the inputs,
 
     [(M s + D)(s - N) + K   R] [x]     [r_w]
     [G, or G (s - N) + V    0] [l] = - [g_w, n_w] w,    y = (y_a s + y_v)(s - N) x + y_x x + y_l l + y_w w
 
-so that y / w = det [P b; c d] / det P. The determinant of P is the characteristic polynomial, times a factor
+The transfer function is y / w = det [P b; c d] / det P. The determinant of P is the characteristic polynomial, times a
 without s.
 """
 
@@ -38,7 +38,7 @@ class PolynomialPencil:
     ring: PolynomialRing
     P: list[list[Any]]  # (n, n + inputs)
     y: list[list[Any]]  # (outputs, n + inputs), times their denominators
-    below: list[Any]  # the denominators of the outputs
+    below: list[Any]  # denominators of the outputs
     what: str
 
     def characteristic(self) -> Any:
@@ -47,14 +47,14 @@ class PolynomialPencil:
         return determinant([row[:n] for row in self.P], self.ring, self.what)
 
     def numerator(self, i: int, k: int) -> Any:
-        """Of the transfer function from input i to output k, times the denominator of the output."""
+        """Numerator of the transfer function from input i to output k, times the denominator of the output."""
         n = len(self.P)
         rows = [[*row[:n], row[n + i]] for row in [*self.P, self.y[k]]]
         return determinant(rows, self.ring, self.what)
 
 
 def polynomial_pencil(m: TracedMechanism, p: Perturbed, f: Freedoms, positive: list[str]) -> PolynomialPencil:
-    """Take linear equations into polynomials; the rows of constraints are those that do not follow from others."""
+    """Convert linear equations to polynomials, with independent constraint rows only."""
     kept = np.setdiff1d(np.arange(len(m.names)), f.held)
     parts = _powers(p, f, kept, m)
     ring = PolynomialRing(parts, m.model.name, positive)
@@ -77,7 +77,7 @@ def polynomial_pencil(m: TracedMechanism, p: Perturbed, f: Freedoms, positive: l
 
 
 def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechanism) -> list[np.ndarray]:
-    """Coefficients of the powers of s: of the equations of motion, constraints and outputs."""
+    """Coefficients of the powers of s in the equations of motion, constraints and outputs."""
     by, k = p.by, len(m.inputs)
     still = {s.index for s in m.added}
 
@@ -91,7 +91,7 @@ def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechani
     l = f.rows_v
 
     def second(a: np.ndarray, v: np.ndarray, x: np.ndarray, more: np.ndarray, w: np.ndarray) -> list[np.ndarray]:
-        """(a s + v) (s - N) + x, columns of multipliers and inputs behind."""
+        """Coefficients of (a s + v) (s - N) + x, followed by columns of multipliers and inputs."""
         n = len(a)
         first = _less(v, matrix_product(a, p.N))
         zeroth = _less(x, matrix_product(v, p.N))
@@ -144,19 +144,19 @@ class TransferFunction:
     Attributes
     ----------
     name : str
-        The mechanism's.
+        Name of the mechanism.
     input, output, input_unit, output_unit : str
     s : sympy.Symbol
     num, den : tuple of sympy.Expr
-        Coefficients, of the highest power first. What numerator and denominator have in common for all values of the
-        parameters is left out.
+        Coefficients, the highest power first, without common factors of numerator and denominator (for all parameter
+        values).
     cancelled : sympy.Expr
-        That common factor, where it has s in it (1 if not): its zeros are eigenvalues of the mechanism that this input
-        does not move or this output does not see.
+        The common factor if it contains s, else 1. Its zeros are eigenvalues of the mechanism that this input does not
+        excite or that do not affect this output.
     parameters : dict
         Name -> value.
     balanced_by : dict
-        Parameter -> the expression (`Node`) that it stands for, since equilibrium asks for it.
+        Parameter -> expression (`Node`) of the others, solved from the conditions of equilibrium.
     """
 
     name: str
@@ -170,7 +170,7 @@ class TransferFunction:
     cancelled: Any
     parameters: dict[str, float]
     balanced_by: dict[str, Node] = field(default_factory=dict)
-    nodes: tuple[list[Any], list[Any]] = field(default=([], []), repr=False)  # of num and den
+    nodes: tuple[list[Any], list[Any]] = field(default=([], []), repr=False)  # coefficients of num and den
     validity: Validity = field(default=Validity(), repr=False)
 
     @property
@@ -183,12 +183,12 @@ class TransferFunction:
         return sum((c * self.s ** (n - k) for k, c in enumerate(coefficients)), 0 * self.s)
 
     def at(self, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
-        """Coefficients of numerator and denominator in numbers, that of the denominator's highest power being 1.
+        """Numerical coefficients of numerator and denominator; the denominator's highest one is 1.
 
         Raises
         ------
         ModelError
-            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
+            If a parameter is unknown or determined by equilibrium, or the point is no equilibrium with it.
         """
         told = checked_values(self, parameters)
         num, den = (np.array(evaluate(x, told), float) for x in self.nodes)
@@ -209,7 +209,7 @@ class TransferFunction:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.polyval(num, s) / np.polyval(den, s)
 
-    # -- what pictures of linear models ask
+    # -- interface of the plots of linear models
 
     large = False
     period = None  # in s, not in z
@@ -226,12 +226,12 @@ class TransferFunction:
 
     @property
     def input_units(self) -> tuple[str, ...]:
-        """Its unit."""
+        """Unit of the input."""
         return (self.input_unit,)
 
     @property
     def output_units(self) -> tuple[str, ...]:
-        """Its unit."""
+        """Unit of the output."""
         return (self.output_unit,)
 
     @property
@@ -240,11 +240,11 @@ class TransferFunction:
         return self.poles()
 
     def input_index(self, name: str | None) -> int:
-        """Zero, if that is the input."""
+        """Index of the input, 0; refuses other names."""
         return self._only("input", self.input, name)
 
     def output_index(self, name: str | None) -> int:
-        """Zero, if that is the output."""
+        """Index of the output, 0; refuses other names."""
         return self._only("output", self.output, name)
 
     def _only(self, what: str, single: str, name: str | None) -> int:
@@ -270,7 +270,7 @@ class TransferFunction:
         return bode_plot(self, None, None, omega, path)  # type: ignore[arg-type]
 
     def to_control(self, **parameters: float) -> Any:
-        """As ``control.TransferFunction``, in numbers.
+        """Numerical ``control.TransferFunction``.
 
         Raises
         ------
@@ -285,10 +285,10 @@ class TransferFunction:
         }
         return control.tf(*self.at(**parameters), **names)
 
-    # -- shown
+    # -- display
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people."""
+        """Labels and texts of the report."""
         out = [("from", with_unit(self.input, self.input_unit)), ("to", with_unit(self.output, self.output_unit))]
         if all(c == 0 for c in self.num):
             return [*out, ("transfer function", "0: to first order the output does not answer to this input")]
@@ -337,7 +337,7 @@ class TransferFunction:
 
 
 def checked_values(f: Any, parameters: Mapping[str, float]) -> dict[str, float]:
-    """Values by name; refuses parameters that there are not, those that equilibrium tells, and another point."""
+    """Check values by name; refuses unknown parameters, those determined by equilibrium, and other points."""
     for name in parameters:
         if name in f.balanced_by:
             raise ModelError(f"{name!r} has the value with which the mechanism is in equilibrium")

@@ -1,11 +1,11 @@
-"""A box and any convex shape: its faces first.
+"""A box and any convex shape: the faces of the box are tested first.
 
-Most contacts of boxes are over the inside of a face, and there the shortest way out is known without a search.
-Let q be the other core's deepest point below a face with normal n, d its depth and m its distance from the
-face's border. If q is above, that is the distance. If below, a plane that has all on one side and leans by t
-against the face is at least d cos t + m sin t >= min(d, m) away while t <= pi/2. Beyond, with f = pi - t, it is
-at least m sin f - d cos f away, and D cos f - L sin f, where x is the core's farthest point in the opposite
-direction, the way out there is D long and L is the distance of x from q along the face. One of the two is at
+In most contacts of boxes the other shape is over the inside of a face, and the shortest way out of the box is known
+without a search. Let q be the other core's deepest point below a face with normal n, d its depth and m its distance
+from the face's border. If q is above the face, that is the distance. If it is below, a supporting plane tilted by t
+against the face is at least d cos t + m sin t >= min(d, m) away while t <= pi/2. For larger tilts, with f = pi - t, it
+is at least m sin f - d cos f away, and also D cos f - L sin f, where x is the core's farthest point in the opposite
+direction, D the length of the way out there, and L the distance of x from q along the face. One of the two is at
 least d if 2 d (m + L) <= D m.
 """
 
@@ -27,7 +27,7 @@ KINDS = (BOX, None)
 
 @formula
 def is_shortest(G, i, j, B, found, inside, r):
-    """Whether the way out of the box along the normal ``found`` is surely the shortest."""
+    """Whether the way out of the box along the normal in ``found`` is certainly the shortest."""
     far, n, q, h = found
     if far + r > 0.0:
         return True
@@ -40,7 +40,7 @@ def is_shortest(G, i, j, B, found, inside, r):
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """Up to four points."""
+    """Write up to four contacts."""
     kind = G.shape_i[j, KIND]
     h, r = load3(G.shape_x, i, PAR), radius(kind, G, j)
     far, n, q = -inf, (0.0, 0.0, 0.0), B[0]

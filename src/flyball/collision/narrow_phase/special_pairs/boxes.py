@@ -1,8 +1,9 @@
 """Two boxes: separating axes.
 
-The 15 axes (faces of either, edge across edge) are tried in the first box's axes (Gottschalk, Lin, Manocha
-1996). The largest separation is the least translation that separates boxes that overlap. For separate boxes it
-is the distance, if their faces are over each other along that axis; else the nearest points are computed.
+The 15 axes (faces of either box, cross products of edges) are tested in the first box's axes (Gottschalk, Lin,
+Manocha 1996). For overlapping boxes the largest separation is the smallest separating translation. For separate
+boxes it is the distance, if their faces are over each other along that axis; otherwise the nearest points are
+computed.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from ..distance import signed_distance
 from ..manifold import manifold, smallest_contact_gap
 
 KINDS = (BOX, BOX)
-PREFER = 1e-6  # sides come before edges, and the first box's sides before the second's, where they part nearly as far
-PARALLEL = 1e-12  # edges whose angle has a smaller square of its sine are no axis of their own
+PREFER = 1e-6  # tolerance by which sides are preferred to edges, and the first box's sides to the second's
+PARALLEL = 1e-12  # squared sine of the angle below which two edges define no axis
 
 
 @formula
 def face_separation(best, C, c, half_a, half_b, first, prefer):
-    """Separation along the sides of one box, c from it to the other; rows of C are its axes in the other's."""
+    """Largest separation along the sides of one box; c from it to the other, rows of C are its axes in the other's."""
     far, axis = best
     for k in range(3):
         reach = half_a[k] + abs(C[3 * k]) * half_b[0] + abs(C[3 * k + 1]) * half_b[1] + abs(C[3 * k + 2]) * half_b[2]
@@ -36,7 +37,7 @@ def face_separation(best, C, c, half_a, half_b, first, prefer):
 
 @formula
 def edge_separation(best, C, c, a, b, prefer):
-    """Separation along edge across edge, axis 6 + 3 k + m."""
+    """Largest separation along cross products of edges, axis 6 + 3 k + m."""
     far, axis = best
     for k in range(3):
         u, v = (k + 1) % 3, (k + 2) % 3
@@ -57,7 +58,7 @@ def edge_separation(best, C, c, a, b, prefer):
 
 @formula
 def axis_vector(axis, C, c):
-    """The unit vector of an axis in the first box's axes, towards the second box."""
+    """Return the unit vector of an axis in the first box's axes, towards the second box."""
     if axis < 3:
         n = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
     elif axis < 6:
@@ -72,7 +73,7 @@ def axis_vector(axis, C, c):
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """Up to four points."""
+    """Write up to four contacts."""
     a, b = load3(G.shape_x, i, PAR), load3(G.shape_x, j, PAR)
     c = mtv(A[1], B[0])
     C = mm(transpose(A[1]), B[1])

@@ -1,4 +1,4 @@
-"""Spheres and capsules with capsules: distances of points and lines."""
+"""Spheres and capsules with capsules: distances of points and line segments."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ...tables import KIND, PAR
 from ..primitives import nearest_parameter, nearest_parameters, sphere_contact, unit_vector_between, write_point
 
 PAIRS = ((SPHERE, CAPSULE), (CAPSULE, CAPSULE))
-PARALLEL = 0.1  # sine of the angle below which the ends of lines are looked at
-SHORTEST = 1e-3  # what is side by side, as part of the radii, is one point below this
-SAME_SIDE = 0.9  # ends whose normal has a smaller cosine with that of the nearest points belong to another side
-SAME_GAP = 1e-5  # gaps that differ by less, as part of the radii, are equal
+PARALLEL = 0.1  # sine of the angle below which contacts at the ends of the segments are computed
+SHORTEST = 1e-3  # relative to the radii; a shorter overlap is one point
+SAME_SIDE = 0.9  # smallest cosine between the normals at an end and at the nearest points
+SAME_GAP = 1e-5  # relative to the radii; smaller differences of gaps count as none
 
 
 @formula
 def axis_segment(G, i, P):
-    """A capsule's line: lower end, way to the upper one."""
+    """Axis segment of a capsule: lower end, vector to the upper end."""
     z = col(P[1], 2)
     h = 0.0 if G.shape_i[i, KIND] == SPHERE else G.shape_x[i, PAR + 1]
     return sub(P[0], scale(h, z)), scale(2.0 * h, z)
@@ -27,7 +27,7 @@ def axis_segment(G, i, P):
 
 @formula
 def perpendicular(u, v):
-    """A unit vector square to u and v; where they are parallel, to the longer one; x where both vanish."""
+    """Return a unit vector perpendicular to u and v; to the longer one if parallel; the x axis if both vanish."""
     w = cross(u, v)
     uu, vv = dot(u, u), dot(v, v)
     if not dot(w, w) > 1e-18 * uu * vv:
@@ -40,7 +40,7 @@ def perpendicular(u, v):
 
 @formula
 def nearest_contact(first, second, p, q, reach, scratch, k):
-    """The contact where two lines (start, way, radius) are nearest, at parts p and q of them; where they cut too."""
+    """Write the contact at parameters p, q of two segments (start, vector, radius); returns gap and normal."""
     a, u, r = first
     b, v, s = second
     x, y = add(a, scale(p, u)), add(b, scale(q, v))
@@ -57,7 +57,7 @@ def nearest_contact(first, second, p, q, reach, scratch, k):
 
 @formula
 def end_contacts(first, second, n, reach, scratch):
-    """Contacts at both ends of what is side by side of two lines, as balls there: how many, the smallest gap."""
+    """Write contacts at both ends of the overlap of two segments, as of spheres there: number, smallest gap."""
     a, u, r = first
     b, v, s = second
     t0, t1 = nearest_parameter(b, a, u), nearest_parameter(add(b, v), a, u)
@@ -76,7 +76,7 @@ def end_contacts(first, second, n, reach, scratch):
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """Where the lines are nearest, and the ends of what is side by side where they are nearly parallel."""
+    """Write the contact at the nearest points, and for nearly parallel segments those at the ends of the overlap."""
     a, u = axis_segment(G, i, A)
     b, v = axis_segment(G, j, B)
     first, second = (a, u, G.shape_x[i, PAR]), (b, v, G.shape_x[j, PAR])

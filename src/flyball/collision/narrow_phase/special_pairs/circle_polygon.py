@@ -14,7 +14,7 @@ KINDS = (SPHERE, POLYGON)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One point; where the middle is inside the polygon, towards the nearest side."""
+    """Write one contact; if the centre is inside the polygon, with the normal of the nearest side."""
     r = G.shape_x[i, PAR]
     length, d, _ = point_polygon_distance(G, j, neg(mtv(B[1], B[0])))
     gap = length - r - G.shape_x[j, PAR]

@@ -1,12 +1,12 @@
 """A height field and any convex shape.
 
 The shape is tested against each triangle under its bounds. Two kinds of contact are distinguished, so that
-nothing catches on an edge between triangles that continue each other:
+shapes do not catch on edges between coplanar triangles:
 
 - a corner of the shape (or its lowest point) is over a triangle, as seen along the triangle's normal: the
-  normal is the triangle's. The field has no sides below its surface: deep points are pushed up. A corner that
-  would come out straight up by less than along the normal belongs to another triangle.
-- a convex edge or corner of the field meets the shape: nearest points, and the normal must be one that the
+  contact normal is the triangle's. The field has no lateral surfaces: deep points are pushed up. A corner whose
+  vertical way out is shorter than that along the normal belongs to another triangle.
+- a convex edge or corner of the field touches the shape: nearest points, and the normal must be one that the
   field has there.
 """
 
@@ -36,7 +36,7 @@ from ..distance import core_separation
 from ..manifold import NEAREST_FEATURE, manifold
 from ..primitives import FACE_2, FIELD_TRIANGLE, MAX_CORNERS, SIMPLEX
 
-SOLIDS = tuple(s.kind for s in SHAPES if s.kind not in (FIELD, POLYGON))  # every convex kind in space
+SOLIDS = tuple(s.kind for s in SHAPES if s.kind not in (FIELD, POLYGON))  # all convex kinds of spatial mechanisms
 PAIRS = tuple((min(k, FIELD), max(k, FIELD)) for k in SOLIDS)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 FEATURES_PER_FACE = 4.0 * MAX_CORNERS
@@ -46,7 +46,7 @@ SPARE_ROW = FIRST_GATHERED - 1
 
 @formula
 def extent(G, s, p, R, r, axis):
-    """From where to where a shape reaches along an axis of the field."""
+    """Range that a shape covers along an axis of the field."""
     d = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
     kind, local = G.shape_i[s, KIND], mtv(R, d)
     low = add(p, mv(R, support(kind, G, s, neg(local))))
@@ -56,7 +56,7 @@ def extent(G, s, p, R, r, axis):
 
 @formula
 def add_surface_point(G, f, point, n, limits, scratch, count):
-    """Keep a point of the surface, if it touches: where, gap along the unit normal n over the triangle, name."""
+    """Add a contact if a surface point touches; ``point``: position, gap along n, feature. Returns the count."""
     x, gap, name = point
     reach, near = limits
     if gap > reach or not is_over_triangle(x, n, scratch):
@@ -68,7 +68,7 @@ def add_surface_point(G, f, point, n, limits, scratch, count):
 
 @formula
 def corner_contacts(G, f, s, P, n, r, limits, scratch, count):
-    """The corners of the side that looks down on the triangle with the unit normal n, and the lowest point."""
+    """Add contacts of the corners of the side that faces the triangle with unit normal n, and of the lowest point."""
     p, R = P
     kind = G.shape_i[s, KIND]
     down = mtv(R, neg(n))
@@ -87,7 +87,7 @@ def corner_contacts(G, f, s, P, n, r, limits, scratch, count):
 
 @formula
 def edge_contacts(G, f, s, P, cell, n, r, limits, scratch, count):
-    """Contacts at an edge or corner of the triangle; where these overlap in no way the field has, one to spare."""
+    """Add contacts at an edge or corner of the triangle; a normal that the field lacks yields the spare contact."""
     i, j, upper = cell
     reach, near = limits
     gap, m, a = core_separation(G, f, s, P[0], P[1], n, reach + r, scratch, SIMPLEX)
@@ -105,7 +105,7 @@ def edge_contacts(G, f, s, P, cell, n, r, limits, scratch, count):
     flush = dot(m, n) > 1.0 - FOLD_TOLERANCE * FOLD_TOLERANCE
     for k in range(found):
         if flush and not is_on_convex_edge(G, f, i, j, upper, n, load3(scratch, k, 0), scratch):
-            continue  # a corner of the shape, or on an edge between triangles in one plane
+            continue  # a corner of the shape, or an edge between coplanar triangles
         name = scratch[k, 7]
         if name == NEAREST_FEATURE:
             name = NEAREST_POINT_FEATURE + scratch[FIELD_TRIANGLE + 3, 0]
@@ -115,7 +115,7 @@ def edge_contacts(G, f, s, P, cell, n, r, limits, scratch, count):
 
 @formula
 def add_spare_contact(scratch, count, near):
-    """Take the contact to spare if the shape is in the field and nothing else says so: out along the triangle."""
+    """Add the spare contact, along the triangle's normal, if no other contact shows that the shape is in the field."""
     for k in range(FIRST_GATHERED, FIRST_GATHERED + count):
         if scratch[k, 6] < 0.0:
             return count
@@ -127,7 +127,7 @@ def add_spare_contact(scratch, count, near):
 
 @formula
 def gather_contacts(G, f, s, P, r, reach, scratch, near):
-    """Gather contacts with all triangles under the shape: how many."""
+    """Gather contacts with all triangles under the shape; returns their number."""
     nx, ny, dx, dy = grid(G, f)
     x0, x1 = extent(G, s, P[0], P[1], r + reach, 0)
     y0, y1 = extent(G, s, P[0], P[1], r + reach, 1)
@@ -151,7 +151,7 @@ def gather_contacts(G, f, s, P, r, reach, scratch, near):
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """Contacts in the field's axes, thinned out, then told in the world's."""
+    """Find contacts in the field's axes, reduce them, and convert them to world axes."""
     turned = G.shape_i[j, KIND] == FIELD
     f, s = (j, i) if turned else (i, j)
     p, Q = B if turned else A

@@ -29,7 +29,7 @@ KINDS = (PLANE, None)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """Corners of the face that looks down on the plane, and the lowest point where that is lower than these."""
+    """Write contacts of the corners of the face towards the plane, and of the lowest point if it is lower."""
     n = col(A[1], 2)
     frame = contact_frame(n)
     kind = G.shape_i[j, KIND]

@@ -13,12 +13,12 @@ from ..distance import polygon_distance, polygon_separation
 from ..manifold import manifold, smallest_contact_gap
 
 KINDS = (POLYGON, POLYGON)
-PREFER = 1e-9  # of the size: sides come before corners, the first polygon's before the second's
+PREFER = 1e-9  # relative to the size; preference of sides over corners, of the first polygon over the second
 
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One or two points of the sides that face each other."""
+    """Write one or two contacts of the facing sides."""
     r, s = G.shape_x[i, PAR], G.shape_x[j, PAR]
     prefer = PREFER * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
     far, n = polygon_separation(G, i, j, A, B, prefer)
@@ -29,7 +29,7 @@ def collide(G, i, j, A, B, reach, scratch):
         count = manifold(G, i, j, A, B, n, (inf, n), reach, scratch)
         if count > 0 and (far <= 0.0 or smallest_contact_gap(scratch, count) <= far - r - s + prefer):
             return count
-    if -inf < far <= 0.0:  # sides too steep to cut: the corner of the second that is deepest
+    if -inf < far <= 0.0:  # sides too steep to clip: the deepest corner of the second polygon
         p = add(B[0], mv(B[1], support(G, j, mtv(B[1], neg(n)))))
         p = sub(p, scale(0.5 * far, n))
     else:

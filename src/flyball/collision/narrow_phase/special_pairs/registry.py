@@ -1,12 +1,12 @@
-"""Every pair of kinds with formulas of its own, found in the files of this folder.
+"""All pairs of kinds with contact formulas of their own, found in the files of this folder.
 
 A file declares ``KINDS = (a, b)``, the smaller number first, or several of these in ``PAIRS``; None as the
-second is any kind that no other file names with the first. And ``collide``, a formula:
+second stands for any kind that no other file declares with the first. It also defines ``collide``, a formula:
 
 ``collide(G, i, j, A, B, reach, scratch)`` -> number of contacts, written into the first rows of ``scratch``
-(`primitives`). ``G`` is the `Geometry`, i of kind a and j of kind b the shapes, ``A`` and ``B`` their poses
-``(p, R)``: origin, and the rotation that takes the shape's components to the world's, row by row. World axes,
-from the origin of shape i. Points with a gap above ``reach`` are no contacts.
+(`primitives`). ``G`` is the `Geometry`, i of kind a and j of kind b are the shapes, ``A`` and ``B`` their poses
+``(p, R)``: origin, and the rotation from the shape's to world axes, row by row. Positions are in world axes,
+relative to the origin of shape i. Points with a gap above ``reach`` are omitted.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _modules() -> list[ModuleType]:
 
 
 def declared_pairs(modules: list[ModuleType]) -> dict[tuple[int, int | None], Callable]:
-    """Pairs that these modules declare.
+    """Collect the pairs declared by these modules.
 
     Raises
     ------

@@ -13,9 +13,9 @@ KINDS = (SPHERE, BOX)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One point; where the middle is inside the box, towards the nearest side."""
+    """Write one contact; if the centre is inside the box, with the normal of the nearest side."""
     h, r = load3(G.shape_x, j, PAR), G.shape_x[i, PAR]
-    c = neg(mtv(B[1], B[0]))  # the sphere's middle in the box's axes
+    c = neg(mtv(B[1], B[0]))  # the sphere's centre in the box's axes
     q = (max(-h[0], min(h[0], c[0])), max(-h[1], min(h[1], c[1])), max(-h[2], min(h[2], c[2])))
     d, length = unit_vector_between(c, q)
     if length == 0.0:

@@ -13,9 +13,9 @@ KINDS = (SPHERE, CYLINDER)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One point; where the middle is inside the cylinder, towards the nearest part of its surface."""
+    """Write one contact; if the centre is inside the cylinder, with the normal of the nearest part of its surface."""
     r, s, h = G.shape_x[i, PAR], G.shape_x[j, PAR], G.shape_x[j, PAR + 1]
-    c = neg(mtv(B[1], B[0]))  # the sphere's middle in the cylinder's axes
+    c = neg(mtv(B[1], B[0]))  # the sphere's centre in the cylinder's axes
     (x, y), rho = lateral_direction(c)
     q = min(rho, s)
     d, length = unit_vector_between(c, (q * x, q * y, max(-h, min(h, c[2]))))

@@ -13,7 +13,7 @@ KINDS = (SPHERE, PLANE)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One point below the sphere's middle."""
+    """Write one contact, below the sphere's centre."""
     n, r = neg(col(B[1], 2)), G.shape_x[i, PAR]
     gap = dot(n, B[0]) - r
     if not gap <= reach:

@@ -12,5 +12,5 @@ KINDS = (SPHERE, SPHERE)
 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
-    """One point, on the line between the middles."""
+    """Write one contact, on the line between the centres."""
     return sphere_contact(A[0], G.shape_x[i, PAR], B[0], G.shape_x[j, PAR], reach, scratch, 0, 0.0)
