@@ -1,4 +1,4 @@
-"""The weights of ``flyball.tables.coordinate_choice``: fitted to the time of a stage of the integration in both coordinate layers.
+"""The weights of ``flyball.tables.coordinate_choice``: fitted to the time of a stage in both coordinate layers.
 
 Prints measured and estimated microseconds a stage, which layer is faster, which one the estimate takes, and the fitted
 weights. Usage: ``python costs.py [--fit]``.
@@ -47,7 +47,7 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     from flyball.progress import no_progress
     from flyball.simulation.initial_state import find_initial_state
     from flyball.simulation.integration_options import default_integration
-    from flyball.simulation.simulate import clock_for, run_clock
+    from flyball.simulation.simulate import clock_for, run_compiled_loop
     from flyball.tables.coordinate_choice import work_counts
 
     model = model.snapshot()
@@ -58,7 +58,7 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     while spent < CPU or len(found) < 3:
         clock = clock_for(start, 0.0, 10.0, np.array([10.0]), options)
         begun = time.process_time()
-        run_clock(start.assembly, clock, tableau("dop853"), no_progress, INTEGRATE)
+        run_compiled_loop(start.assembly, clock, tableau("dop853"), no_progress, INTEGRATE)
         seconds = time.process_time() - begun
         spent += seconds
         found.append(seconds / (clock.count.accepted + clock.count.rejected) / STAGES)

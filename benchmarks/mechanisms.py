@@ -26,7 +26,7 @@ from flyball.numerics.integrators.butcher_tableaux import tableau
 from flyball.progress import no_progress
 from flyball.simulation.initial_state import find_initial_state
 from flyball.simulation.integration_options import MOST_STEPS, default_integration
-from flyball.simulation.simulate import clock_for, run_clock
+from flyball.simulation.simulate import clock_for, run_compiled_loop
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
@@ -68,7 +68,7 @@ class Kernel:
         clock = clock_for(self.start, 0.0, self.times[-1], self.times, self.asked)
         method = tableau(self.asked.method)
         begun = time.process_time()
-        run_clock(self.start.assembly, clock, method, no_progress, self.task)
+        run_compiled_loop(self.start.assembly, clock, method, no_progress, self.task)
         return time.process_time() - begun
 
 

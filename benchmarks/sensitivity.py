@@ -30,7 +30,7 @@ from flyball.sensitivity.parameter_derivatives import (
 from flyball.sensitivity.variational_equations import VariationalIntegration
 from flyball.simulation.initial_state import find_initial_state
 from flyball.simulation.integration_options import default_integration
-from flyball.simulation.simulate import clock_for, run_clock
+from flyball.simulation.simulate import clock_for, run_compiled_loop
 from mechanisms import example
 
 RTOL, ATOL = 1e-9, 1e-11
@@ -116,7 +116,7 @@ def kernels(m: fb.Mechanism, to: Sequence[str], t_end: float, coordinates: str) 
 
     def plain() -> None:
         clock = clock_for(start, 0.0, t_end, times, o)
-        run_clock(start.assembly, clock, tableau("dop853"), lambda fraction, note="": None, INTEGRATE)
+        run_compiled_loop(start.assembly, clock, tableau("dop853"), lambda fraction, note="": None, INTEGRATE)
         steps[:] = [int(clock.count.accepted)]
 
     def varied() -> None:

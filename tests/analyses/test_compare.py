@@ -14,7 +14,7 @@ import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.cli import app
-from flyball.engine import projection
+from flyball.engine import stabilization
 from flyball.engine.entry_point import MOTION
 from flyball.simulation import initial_state
 from flyball.studies import formulation_comparison as comparing
@@ -200,14 +200,14 @@ def test_independent_coordinates_stay_as_they_are(make):
     q = start.assembly.q + 1e-4 * random.standard_normal(nq)
     v = start.assembly.v + random.standard_normal(c.structure.nv)
     W.options.stabilization, W.options.position_tolerance, W.options.velocity_tolerance = (
-        projection.PARTITIONING,
+        stabilization.PARTITIONING,
         1e-13,
         1e-12,
     )
     status, _ = c.at(0.0, q, v, MOTION)
     assert status == 0
     settled = W.y[0].copy()
-    W.options.stabilization = projection.NONE
+    W.options.stabilization = stabilization.NONE
     c.at(0.0, settled[:nq].copy(), settled[nq : nq + len(v)].copy())
     assert np.abs(W.rows.value).max() < ROUNDING
     rows, moved = c.jacobian(), settled[nq : nq + len(v)]

@@ -228,7 +228,7 @@ def test_sets_of_a_large_mechanism_are_counted_where_they_are_not_all_sought(mon
     """Three constraints too many in each of two windows; of each window's one is looked into."""
     from flyball.mobility import mobility as redundancy
 
-    monkeypatch.setattr(redundancy, "DENSE", 0)
+    monkeypatch.setattr(redundancy, "MAX_DOUBTFUL_SVD_SIZE", 0)
     monkeypatch.setattr(redundancy, "MAX_DEPENDENCIES", 1)
     m = windows(2)
     assert [s.count for s in mobility(m, assemble(m)).sets] == [3, 3]

@@ -71,7 +71,7 @@ def test_what_begins_beneath_sinks_no_deeper():
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 def test_beneath_the_floor_is_refused(monkeypatch, size):
-    happens, times = event_loop.EventDrivenMotion.happens, []
+    happens, times = event_loop.EventDrivenMotion.resolve, []
 
     def sunk(self, fired):
         times.append(self.here.t)

@@ -59,7 +59,7 @@ def test_a_law_that_is_put_right_at_a_jump(monkeypatch):
 
 def test_a_law_of_a_held_rate_is_put_right(monkeypatch):
     """The side was that of a rate's rounding: once silent. Locked, then v' = +-(2 - |v| / 2)."""
-    monkeypatch.setattr(Corners, "_nothing", lambda self, s, u, least: least)
+    monkeypatch.setattr(Corners, "_rounding_of", lambda self, s, u, least: least)
     for way in (1, -1):
         for came in (1, -1):
             lock = fb.Event("lock", "t > 0.2", do=[fb.Lock("s")])

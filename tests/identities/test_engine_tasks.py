@@ -9,9 +9,9 @@ from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.engine.calls import GUARD_VALUES, MOTION, POSITION, SLOPES, TANGENT
 from flyball.engine.entry_point import evaluate_state, run_task
 from flyball.engine.kinematics import retract
-from flyball.engine.projection import BAUMGARTE, NONE, STEPS
 from flyball.engine.pulse_detection import INSPECTION_ROWS
 from flyball.engine.residual import DAMPING, DIRECTIONS, FORCE_ALONG, SLOPE_WIDTH, STIFFNESS
+from flyball.engine.stabilization import BAUMGARTE, NONE, STEPS
 from flyball.numerics.integrators.butcher_tableaux import tableau
 from flyball.numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
 from flyball.simulation.initial_state import find_initial_state

@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
-from flyball.engine import motion, projection
+from flyball.engine import motion, stabilization
 from flyball.engine.entry_point import MOTION, run_task
 from flyball.numerics.integrators import time_loop as explicit
 from flyball.numerics.integrators.butcher_tableaux import tableau
@@ -58,8 +58,8 @@ def ready(name, stabilize):
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_compiled_is_plain_python(name):
     """The right-hand side, projection included, run as the plain function it is: the same numbers to 1e-12."""
-    c, y = ready(name, projection.STAGES)
-    plain, _ = ready(name, projection.STAGES)
+    c, y = ready(name, stabilization.STAGES)
+    plain, _ = ready(name, stabilization.STAGES)
     clock = explicit.StepState(
         np.r_[1e-3, np.zeros(9)],
         np.zeros(9, np.int64),

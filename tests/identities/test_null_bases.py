@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from flyball.numerics.rank import null_space
 from flyball.numerics.sparse_rank import (
-    FEW,
+    MAX_SVD_SIZE,
     clearly_independent,
     negative_pivots,
     null_basis,
@@ -66,7 +66,7 @@ def test_pivots_say_what_singular_values_say_or_nothing(apart):
     A /= np.linalg.norm(A, axis=1)[:, None]
     d = np.linalg.svd(A, compute_uv=False)
     least = int((d > 1e-8 * d[0]).sum())
-    assert max(A.shape) > FEW
+    assert max(A.shape) > MAX_SVD_SIZE
     assert sparse_matrix_rank(sp.csr_matrix(A)) == sparse_matrix_rank(A) == least
     found, lam, _ = null_spaces(sp.csr_matrix(A))
     assert (found, lam.shape) == (least, (200, 200 - least))

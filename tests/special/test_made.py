@@ -18,8 +18,8 @@ from flyball.compiler.kernels import StructBuffer
 from flyball.compiler.object_code import read_object
 from flyball.engine.calls import COMPLETE
 from flyball.engine.entry_point import allocate_work, run_task
-from flyball.engine.projection import NONE, STAGES
 from flyball.engine.pulse_detection import INSPECTION_ROWS
+from flyball.engine.stabilization import NONE, STAGES
 from flyball.numerics.integrators import time_loop as ex
 from flyball.numerics.integrators.butcher_tableaux import tableau
 from flyball.simulation.initial_state import find_initial_state

@@ -19,7 +19,7 @@ from ..compiler.kernels import BoundKernel, PooledBuffer, StructBuffer
 from ..engine.calls import OutputBuffer
 from ..engine.entry_point import POSITION, allocate_work, engine, evaluate_state, pooled_work, struct_tables
 from ..engine.kinematics import count_plain_coordinates, joint_velocities, quaternion_at, turned_angles
-from ..engine.projection import NONE
+from ..engine.stabilization import NONE
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
 from ..numerics.integrators.butcher_tableaux import Tableau

@@ -18,7 +18,6 @@ from ..engine.element_dispatch import progress, remember
 from ..engine.entry_point import allocate_work
 from ..engine.loads import loads_end, reaction_loads
 from ..engine.motion import apply_all_forces, store_derivative
-from ..engine.projection import set_prescribed, update_positions, update_velocities, velocity_violation
 from ..engine.pulse_detection import LAWS, count_law_inputs, inspection_buffer, law_at, store_law_inputs
 from ..engine.rows import BY_TIME, count_measured, row_times
 from ..engine.solve import (
@@ -26,10 +25,11 @@ from ..engine.solve import (
     factor,
     pass_coupled,
     pass_schur,
-    remainder_coupled,
-    remainder_schur,
+    residual_coupled,
+    residual_schur,
     rows_by_inverse_mass,
 )
+from ..engine.stabilization import set_prescribed, update_positions, update_velocities, velocity_violation
 from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision
 from ..expression_graph.printers.llvm import Place, Procedure, ordered_operations
 from ..expression_graph.tracing import TRACED_TABLES
@@ -234,7 +234,7 @@ class SolveProcedures(ProcedureRecorder):
                 apply_inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
             W.rows.scratch_1[:] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
         elif S.sizes.solver == COUPLED and is_loaded:
-            remainder_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+            residual_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
         elif S.sizes.solver == ARTICULATED:
             solve_articulated(S, W, f, x, W.velocities.effort)
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
@@ -270,7 +270,7 @@ class SolveProcedures(ProcedureRecorder):
         x, lam = x.copy(), lam.copy()
         if S.sizes.solver == SCHUR:
             pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
-            worst, *rows = remainder_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
+            worst, *rows = residual_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)

@@ -68,9 +68,9 @@ from .element_dispatch import remember
 from .guards import evaluate_guards
 from .kinematics import store_ground_frames
 from .motion import derivative, follow_drivers, project_and_evaluate, report_state, solve_response
-from .projection import project_error, update_positions, update_velocities
 from .pulse_detection import INSPECTION_ROWS, inspect_step
 from .residual import force_slopes, residual
+from .stabilization import project_error, update_positions, update_velocities
 
 MAX_KEPT_LAYOUTS = 4  # layouts of workspaces and tables that are cached for each structure
 

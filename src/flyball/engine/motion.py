@@ -39,7 +39,9 @@ from .loads import (
     update_loads,
     update_readings,
 )
-from .projection import (
+from .rows import BY_TIME, controller_column, count_measured, direction_column, row_times, update_controllers
+from .solve import MAX_REFINEMENTS, exchange_coordinates, factor, reuse_factor, solve
+from .stabilization import (
     BAUMGARTE,
     FACTOR_CURRENT,
     FACTOR_NEAR,
@@ -58,8 +60,6 @@ from .projection import (
     update_velocities,
     velocity_violation,
 )
-from .rows import BY_TIME, controller_column, count_measured, direction_column, row_times, update_controllers
-from .solve import MAX_REFINEMENTS, exchange_coordinates, factor, reuse_factor, solve
 
 ALONG_MOTION = -1  # derivative along the motion
 MAX_CORNER_PASSES = 40

@@ -65,8 +65,8 @@ from .loads import (
     sliding_sign,
     wrench_between_frames,
 )
-from .projection import set_prescribed
 from .rows import count_measured, row_times, update_controllers
+from .stabilization import set_prescribed
 
 
 @formula

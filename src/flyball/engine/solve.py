@@ -214,7 +214,7 @@ def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def is_stalled(worst, last, off, last_off, beyond):
-    """Whether another pass is useless; arguments as `remainder_coupled` returns them, now and after the last pass.
+    """Whether another pass is useless; arguments as `residual_coupled` returns them, now and after the last pass.
 
     Where all accelerations are zero except for residuals, as at rest, the relative residual does not fall however small
     they become. There the residual itself has to fall.
@@ -238,7 +238,7 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     worst = 0.0
     last = last_off = 1e300
     for _ in range(refinements):
-        worst, off, beyond = remainder_schur(S, W, gamma, x, lam, rhs, semidefinite)
+        worst, off, beyond = residual_schur(S, W, gamma, x, lam, rhs, semidefinite)
         if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
             break
         last, last_off = worst, off
@@ -282,7 +282,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:
-        remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+        residual_coupled(S, W, f, gamma, x, lam, rhs, loaded)
     for _ in range(refinements):
         worst, off, beyond = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
         if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
@@ -293,7 +293,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
-    """Add to x and lam one solve for the residuals of both equations; returns what `remainder_coupled` does."""
+    """Add to x and lam one solve for the residuals of both equations; returns what `residual_coupled` does."""
     z = W.D[2]
     nv = x.shape[0]
     for d in range(nv):
@@ -305,12 +305,12 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
         x[d] += z[S.ldl.perm[d]]
     for k in range(lam.shape[0]):
         lam[k] -= z[S.ldl.perm[nv + k]]
-    return remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+    return residual_coupled(S, W, f, gamma, x, lam, rhs, loaded)
 
 
 @formula
-def remainder_schur(S, W, gamma, x, lam, rhs, semidefinite):
-    """Residuals of both equations after a pass through S; returns what `remainder_coupled` does."""
+def residual_schur(S, W, gamma, x, lam, rhs, semidefinite):
+    """Residuals of both equations after a pass through S; returns what `residual_coupled` does."""
     worst, off, beyond = row_residual(S, W, gamma, x, lam)
     if semidefinite:
         worst = larger(worst, excess_mass_residual(S, W.velocities.scratch_1, rhs, x))
@@ -346,7 +346,7 @@ def row_residual(S, W, gamma, x, lam):
 
 
 @formula
-def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
+def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Residuals of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
     Returns the largest entry of either relative to its terms, that of gamma - G x, and its part beyond rounding. The

@@ -24,7 +24,7 @@ from ..mobility.null_spaces import jacobian_rank, scaled_jacobian
 from ..model.body import Driver
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_unsupported
-from ..numerics.sparse_rank import DENSE
+from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE
 from ..progress import no_progress, progress_bar
 from ..results.mobility import Mobility
 from ..results.result import Result
@@ -236,7 +236,7 @@ def _lock_error(start: InitialState, error: SimulationError) -> SingularityError
     if base is not own:
         q, v = base.take(own, t, q, v)
     base.at(t, q, v)
-    if base.structure.nv > DENSE:
+    if base.structure.nv > MAX_DOUBTFUL_SVD_SIZE:
         return None
     U, d, _ = np.linalg.svd(scaled_jacobian(base)[0].toarray(), full_matrices=False)
     n = base.structure.nv

@@ -30,7 +30,7 @@ from ..model.model import Model, listing, suggest
 from ..model.table import Table
 from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import fundamental_subspaces
-from ..numerics.sparse_rank import DENSE, FEW, rank_by_pivots
+from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, rank_by_pivots
 from ..results.inverse_dynamics import Drive, InverseDynamics
 from ..results.recorded_kinematics import RecordedMotion
 from ..results.result import Result
@@ -129,7 +129,7 @@ class _DependencySearch:
         c.at(float(t[0]), q, v)
         G, size, _ = scaled_jacobian(c)
         size = np.maximum(size, 1e-300)
-        large, many = max(G.shape) > DENSE, count >= MAX_ITERATED and max(G.shape) > FEW
+        large, many = max(G.shape) > MAX_DOUBTFUL_SVD_SIZE, count >= MAX_ITERATED and max(G.shape) > MAX_SVD_SIZE
         if (large or many) and (found := rank_by_pivots(G)) is not None:
             (count, own), self.out.least[k] = found, 1.0
         else:

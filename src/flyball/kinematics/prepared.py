@@ -108,7 +108,7 @@ class Prepared:
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """Return M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
-        c = self._scratch("bare")
+        c = self._workspace("bare")
         self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
         M = np.zeros((len(self.v), len(self.v)))
         row, at, _ = c.values.system.mass_entries
@@ -143,15 +143,15 @@ class Prepared:
 
     def jacobian(self, t: float, q: np.ndarray) -> np.ndarray:
         """Return G, (nr, nv): derivatives of the constraint rows along the velocities."""
-        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).jacobian()
+        return self._at(self._workspace(), t, q, np.zeros(len(self.v))).jacobian()
 
     def constraint(self, t: float, q: np.ndarray) -> np.ndarray:
         """Return the constraint residuals g, (nr,) [m, rad, 1]; 0 for rows of velocities only."""
-        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.rows.value.copy()
+        return self._at(self._workspace(), t, q, np.zeros(len(self.v))).work.rows.value.copy()
 
     def constraint_rate(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return G v less the rates that drivers prescribe, (nr,) [m/s, rad/s]."""
-        c = self._at(self._scratch(), t, q, v)
+        c = self._at(self._workspace(), t, q, v)
         return c.jacobian() @ np.asarray(v, float) - c.work.rows.nu
 
     def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -171,8 +171,8 @@ class Prepared:
         """Return the origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3);
         world axes.
         """
-        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
-        b, offset, turn = self._carried(c, name)
+        c = self._at(self._workspace(), 0.0, q, np.zeros(len(self.v)))
+        b, offset, turn = self._body_of_frame(c, name)
         if b < 0:
             return offset, turn
         p, R = c.work.BK[b, :3].copy(), c.work.BK[b, 3:12].reshape(3, 3).copy()
@@ -182,9 +182,9 @@ class Prepared:
         """Return the derivatives of a frame's velocity (rows 0 to 2) and angular velocity (3 to 5), world axes, (6,
         nv).
         """
-        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
+        c = self._at(self._workspace(), 0.0, q, np.zeros(len(self.v)))
         S, W = c.values.system, c.work
-        b, offset, _ = self._carried(c, name)
+        b, offset, _ = self._body_of_frame(c, name)
         J = np.zeros((6, len(self.v)))
         point = W.BK[b, :3] + W.BK[b, 3:12].reshape(3, 3) @ offset
         while b >= 0:
@@ -220,17 +220,17 @@ class Prepared:
         """Return the lines as text."""
         return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
 
-    def _scratch(self, which: str = "moving") -> CompiledMechanism:
+    def _workspace(self, which: str = "moving") -> CompiledMechanism:
         """Return this thread's own workspace, with the angles of the start."""
         found: CompiledMechanism | None = getattr(self._here, which, None)
         if found is None:
-            found = self._start.compiled.again() if which == "moving" else self._bare()
+            found = self._start.compiled.again() if which == "moving" else self._without_forces()
             setattr(self._here, which, found)
         if which == "moving":
             found.z = self._start.compiled.z.copy()
         return found
 
-    def _bare(self) -> CompiledMechanism:
+    def _without_forces(self) -> CompiledMechanism:
         """Return bodies and joints alone, with a mass matrix; drivers would override the coordinates that they
         prescribe.
         """
@@ -244,7 +244,7 @@ class Prepared:
         return compile_mechanism(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
 
     def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> CompiledMechanism:
-        c = self._at(self._scratch(), t, q, v, MOTION)
+        c = self._at(self._workspace(), t, q, v, MOTION)
         if not np.isfinite(c.work.velocities.solved).all():
             found = c.structure.missed(c.work.stack) or function_fault(c.work.stack, c.structure.functions)
             why = found.message if found else "a force or a law gives no finite number, or the equations no solution"
@@ -320,7 +320,7 @@ class Prepared:
             out.append(found.astype(float))
         return out[0], out[1]
 
-    def _carried(self, c: CompiledMechanism, name: str) -> tuple[int, np.ndarray, np.ndarray]:
+    def _body_of_frame(self, c: CompiledMechanism, name: str) -> tuple[int, np.ndarray, np.ndarray]:
         """Return the row of the body that carries a frame (-1: ground), and its origin and axes in the body."""
         if name == GROUND:
             return -1, np.zeros(3), np.eye(3)

@@ -206,7 +206,7 @@ class CrossingSearch:
         before = len(self.taken)
         at_a, low = self._end(a, b)
         at_b, high = self._end(b, a)
-        return at_a + (self._parted(low, high, before, 0) if low.place < high.place else []) + at_b
+        return at_a + (self._bisect(low, high, before, 0) if low.place < high.place else []) + at_b
 
     def _end(self, x: EigenvalueSample, y: EigenvalueSample) -> tuple[list[StabilityEvent], EigenvalueSample]:
         """Events at the end ``x`` of the interval to ``y``, and a sample beyond them."""
@@ -218,7 +218,7 @@ class CrossingSearch:
                 return found, beyond
         return found, y if found else x
 
-    def _parted(self, a: EigenvalueSample, b: EigenvalueSample, before: int, depth: int) -> list[StabilityEvent]:
+    def _bisect(self, a: EigenvalueSample, b: EigenvalueSample, before: int, depth: int) -> list[StabilityEvent]:
         through = _axis_crossings(a, b)
         tired = len(self.taken) - before > MAX_EVALUATIONS
         if a.counts == b.counts and (not through or depth > MAX_FOLLOWED_HALVINGS or tired):
@@ -233,8 +233,8 @@ class CrossingSearch:
         middle = self._middle(a, b)
         if tired:
             near = (a, middle) if a.growing != middle.growing else (middle, b)
-            return self._parted(*near, before, depth + 1)
-        return self._parted(a, middle, before, depth + 1) + self._parted(middle, b, before, depth + 1)
+            return self._bisect(*near, before, depth + 1)
+        return self._bisect(a, middle, before, depth + 1) + self._bisect(middle, b, before, depth + 1)
 
     def _at_end(self, x: EigenvalueSample, y: EigenvalueSample) -> list[StabilityEvent]:
         """Events at the end ``x`` of the interval to ``y``: eigenvalues that begin or cease to grow there."""

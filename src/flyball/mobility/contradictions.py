@@ -14,7 +14,7 @@ from ..model.joint import Joint
 from ..numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space
 from ..numerics.rank import rank as rank_of
 from .mobility import free_motions, nearby_positions
-from .null_spaces import DENSE, scaled_jacobian
+from .null_spaces import MAX_DOUBTFUL_SVD_SIZE, scaled_jacobian
 
 LEAST_SHARE = 1e-6  # relative share in a contradiction below which an element does not take part
 LEAST_MOTION = 1e-6  # rate of a coordinate in a free motion, relative to its gradient, that counts as zero
@@ -64,7 +64,7 @@ def explain_contradiction(
     case = ContradictionCase(c, t, q, v, right, per)
     c.at(t, q, v)
     G, size, _ = scaled_jacobian(c)
-    if max(G.shape) > DENSE:  # singular values would take minutes
+    if max(G.shape) > MAX_DOUBTFUL_SVD_SIZE:  # singular values would take minutes
         return ""
     Y = fundamental_subspaces(G.toarray()).dependencies
     over = Y @ (Y.T @ (right / np.maximum(size, 1e-300)))

@@ -26,7 +26,7 @@ from ..model.joint import Joint
 from ..model.model import Model
 from ..model.unsupported_elements import ignored_elements
 from ..numerics.rank import rank
-from ..numerics.sparse_rank import DENSE, null_spaces, sparse_null_space
+from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, null_spaces, sparse_null_space
 from ..results.mobility import FreedomGeometry, FreeMotion, Mobility, RedundantSet
 from ..tables.forest import point_mass_obstacles
 from ..tables.table_definitions import POINT, Frames
@@ -312,7 +312,7 @@ def redundant_sets(
     size = np.maximum(size, 1e-300)
     names = list(s.slices)
     groups = [np.arange(r.start, r.stop) for r in s.slices.values()]
-    most = MAX_DEPENDENCIES if max(G.shape) > DENSE else lam.shape[1]
+    most = MAX_DEPENDENCIES if max(G.shape) > MAX_DOUBTFUL_SVD_SIZE else lam.shape[1]
     found = minimal_subspaces(lam * size[:, None], groups, most)
     all_found = sum(basis.shape[1] for _, basis in found) == redundancy
     found.sort(key=lambda x: len(x[0]))
@@ -379,7 +379,7 @@ class MobilityDetails(ConstraintNullSpaces):
         """See `Mobility.motions`."""
         a = self.assembly
         a.compiled.at(a.t, a.q, a.v)  # descriptions of rotations use the present positions
-        large = max(m.rows, m.velocities) > DENSE
+        large = max(m.rows, m.velocities) > MAX_DOUBTFUL_SVD_SIZE
         return free_motions(a, self.velocities[:, : MAX_NAMED_MOTIONS if large else None])
 
     def geometry(self, m: Mobility) -> FreedomGeometry:

@@ -20,7 +20,7 @@ from ..engine.kinematics import load_record
 from ..engine.rows import row_parameters
 from ..math.vec import neg, scale
 from ..numerics.rank import column_space, fundamental_subspaces, null_space
-from ..numerics.sparse_rank import DENSE, FEW, sparse_matrix_rank, sparse_null_space
+from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, sparse_matrix_rank, sparse_null_space
 from ..tables.values import Values
 
 
@@ -41,7 +41,7 @@ class ConstraintNullSpaces:
         a = self.assembly
         a.compiled.at(a.t, a.q, a.v)
         G, _, scale = scaled_jacobian(a.compiled)
-        few = max(G.shape) <= DENSE
+        few = max(G.shape) <= MAX_DOUBTFUL_SVD_SIZE
         return (null_space(G.toarray()) if few else sparse_null_space((G.T @ G).tocsr())[1]) * scale[:, None]
 
 
@@ -80,7 +80,7 @@ def jacobian_rank(c: CompiledMechanism) -> int:
 
 def is_small(c: CompiledMechanism) -> bool:
     """Return whether the Jacobian is small enough for a rank from the dense matrix."""
-    return max(len(c.structure.rows), c.structure.nv) <= FEW
+    return max(len(c.structure.rows), c.structure.nv) <= MAX_SVD_SIZE
 
 
 CHANGE_TOLERANCE = 1e-6  # relative effect of a self-stress on a reaction component that counts as zero

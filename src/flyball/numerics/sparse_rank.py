@@ -143,18 +143,18 @@ def smallest_singular_values(P, L, D, row_p, col_i, H, X, w, z):
     return value, largest
 
 
-FEW = 150  # rows or columns up to which singular values are as fast as pivots
-DENSE = 1500  # rows or columns up to which singular values decide doubtful pivots
+MAX_SVD_SIZE = 150  # rows or columns up to which singular values are as fast as pivots
+MAX_DOUBTFUL_SVD_SIZE = 1500  # rows or columns up to which singular values decide doubtful pivots
 CERTAIN_PIVOT = 1e-8  # pivots of unit rows above this are certainly nonzero: singular values above 1e-4
 ZERO_PIVOT = 1e-10  # pivots of a large matrix with unit rows below this count as zero
 DOUBTFUL_PIVOT = 1e-5  # pivots up to this may come from the diagonal shift (null vectors with |x|^2 < 1e8)
 DIAGONAL_SHIFT = 1e-13  # added to the diagonal of such a matrix
-ROOM = 2**24  # largest number of entries (128 MB) of a null-space basis of a matrix larger than `DENSE`
+ROOM = 2**24  # largest number of entries (128 MB) of a null-space basis of a matrix larger than `MAX_DOUBTFUL_SVD_SIZE`
 
 
 def sparse_matrix_rank(G: Any) -> int:
     """Return the number of independent rows of a sparse matrix or an array."""
-    if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
+    if max(G.shape) > MAX_SVD_SIZE and (found := rank_by_pivots(G)) is not None:
         return found[0]
     return rank_of_array(_as_array(G))
 
@@ -163,9 +163,9 @@ def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     """Rank, dependencies among the rows (n, n - rank), and a basis of the null space (m, m - rank).
 
     G is sparse, or an array. If pivots decide, the basis of dependencies is not orthonormal and the null space is None.
-    For a matrix larger than `DENSE` only as many dependencies are returned as `ROOM` allows.
+    For a matrix larger than `MAX_DOUBTFUL_SVD_SIZE` only as many dependencies are returned as `ROOM` allows.
     """
-    if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
+    if max(G.shape) > MAX_SVD_SIZE and (found := rank_by_pivots(G)) is not None:
         return *found, None
     q = fundamental_subspaces(_as_array(G))
     return q.rank, q.dependencies, q.null
@@ -177,7 +177,7 @@ def rank_by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
 
     G = sp.csr_matrix(G)
     p = SemidefinitePivots(G @ G.T)
-    basis = p.vectors(p.shown) if max(G.shape) > DENSE else p.dependencies(G)
+    basis = p.vectors(p.shown) if max(G.shape) > MAX_DOUBTFUL_SVD_SIZE else p.dependencies(G)
     return None if basis is None else (int(G.shape[0]) - len(p.weak), basis)
 
 

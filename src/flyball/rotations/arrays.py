@@ -129,7 +129,8 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
     if np.any(off > ORTHONORMAL):
         k = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ModelError(
-            f"{what}{index_text(tuple(map(int, k)))}: the matrix is not a rotation: its columns must be orthonormal, but "
+            f"{what}{index_text(tuple(map(int, k)))}: the matrix is not a rotation: its columns must be "
+            f"orthonormal, but "
             f"R^T R is off by {off[k]:.2g} (at most {ORTHONORMAL:g}); rotations.nearest gives the closest rotation"
         )
     refuse_values(

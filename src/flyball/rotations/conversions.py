@@ -479,7 +479,8 @@ def gibbs(orientation: Any) -> np.ndarray:
     if np.any(distance < SINGULAR):
         k = np.unravel_index(int(np.argmin(distance)), distance.shape)
         raise SingularOrientationError(
-            f"rotations.gibbs{index_text(tuple(map(int, k)))}: the turn is {distance[k]:.2g} rad from half a turn (rule: "
+            f"rotations.gibbs{index_text(tuple(map(int, k)))}: "
+            f"the turn is {distance[k]:.2g} rad from half a turn (rule: "
             f"at least {SINGULAR:g}), where the Gibbs vector is infinite; use the quaternion, the rotation vector or "
             "the modified Rodrigues parameters",
             angle=float(np.pi - distance[k]),

@@ -199,7 +199,8 @@ def _refuse_singular(angles: np.ndarray, s: Sequence, tolerance: float) -> None:
     at = tuple(int(i) for i in k)
     near, cure = singular_angles(s.name), sequence_remedy(from_euler(angles[k].real, s.name), "quaternion_rates")
     raise SingularOrientationError(
-        f"Euler angles {s.name!r}{index_text(at)}: the middle angle {b[k]:.9g} rad is {distance[k]:.2g} rad from a singular "
+        f"Euler angles {s.name!r}{index_text(at)}: the middle angle {b[k]:.9g} rad is {distance[k]:.2g} rad "
+        f"from a singular "
         f"one ({near[0]:.5g} or {near[1]:.5g}, and whole turns on; rule: at least {tolerance:g}), where an angular "
         f"velocity has no finite rates of these angles; {cure}",
         s.name,
@@ -364,7 +365,8 @@ def left_jacobian_inverse(vector: Any) -> np.ndarray:
     if np.any(distance < SINGULAR):
         k = np.unravel_index(int(np.argmin(distance)), distance.shape)
         raise SingularOrientationError(
-            f"rotation vector{index_text(tuple(map(int, k)))}: the angle {angle[k]:.9g} rad is {distance[k]:.2g} rad from "
+            f"rotation vector{index_text(tuple(map(int, k)))}: "
+            f"the angle {angle[k]:.9g} rad is {distance[k]:.2g} rad from "
             f"whole turns (rule: at least {SINGULAR:g}), where an angular velocity has no finite rates of it; use the "
             "shorter vector of the same orientation, rotation_vector(from_rotation_vector(...)), or quaternion_rates",
             angle=float(angle[k]),

@@ -26,7 +26,7 @@ from ..results.result import Result
 from ..simulation.diagnosis import failure_reason
 from ..simulation.initial_state import InitialState
 from ..simulation.prescribed_motion import cumulative_integrals, refined_nodes
-from ..simulation.simulate import run_clock
+from ..simulation.simulate import run_compiled_loop
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, Work, named_arrays, with_numbers
 from ..tables.values import Values
@@ -91,7 +91,7 @@ def prescribed_motion_sensitivity(loop: VariationalIntegration) -> MotionSensiti
     start, clock = loop.start, loop.clock
     at = 1 + clock.integrals
     own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
-    rows, _ = run_clock(start.assembly, own, loop.R, _no_progress, FOLLOW)
+    rows, _ = run_compiled_loop(start.assembly, own, loop.R, _no_progress, FOLLOW)
     if own.count.status != ex.DONE:
         raise loop.stopped(own, motion_only=True)
     z, n = clock.integrals - loop.nq - loop.nv, len(clock.integrals)

@@ -30,7 +30,7 @@ from ..results.result import Result, concatenate_results
 from ..results.result_loading import read_result
 from ..results.study import study_fingerprint
 from .diagnosis import acceleration_violation
-from .impulse_stepping.impulse_motion import INTERRUPTED_MESSAGE
+from .impulse_stepping.impulse_simulation import INTERRUPTED_MESSAGE
 from .initial_state import start_time
 from .integration_intervals import Segment
 from .integration_options import output_times

@@ -12,20 +12,20 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..analysis_options import Options, names_of, require_count, require_positive, seconds
-from ..engine import projection
+from ..engine import stabilization
 from ..errors import ModelError
 from ..numerics.complementarity.solver_choice import solver_names
 from ..numerics.integrators.butcher_tableaux import tableau
 from .initial_state import refuse_unknown_coordinates as known_coordinates
 
 STABILIZATION = {
-    "projection": projection.STAGES,
-    "projection-steps": projection.STEPS,
-    "baumgarte": projection.BAUMGARTE,
-    "none": projection.NONE,
-    "positions": projection.POSITIONS,
-    "velocities": projection.VELOCITIES,
-    "partitioning": projection.PARTITIONING,
+    "projection": stabilization.STAGES,
+    "projection-steps": stabilization.STEPS,
+    "baumgarte": stabilization.BAUMGARTE,
+    "none": stabilization.NONE,
+    "positions": stabilization.POSITIONS,
+    "velocities": stabilization.VELOCITIES,
+    "partitioning": stabilization.PARTITIONING,
 }
 MOST_STEPS = 10_000_000  # steps
 COPIES_IN_MEMORY = 2  # copies of a motion in memory while its parts are joined

@@ -14,8 +14,8 @@ from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..constraints.switch_kinds import BRANCH, FRICTION
 from ..engine.entry_point import FOLLOW, INTEGRATE
-from ..engine.projection import TIGHT_G, TIGHT_V
 from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
+from ..engine.stabilization import TIGHT_G, TIGHT_V
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
 from ..laws.breakpoints import NO_BREAKPOINTS
 from ..laws.python_functions import clear_faults, deferred_interrupts
@@ -30,7 +30,7 @@ from . import initial_state
 from .events.context import EventContext
 from .events.event_loop import integrate_events
 from .implicit.integrators import refuse_for_variational
-from .impulse_stepping.impulse_motion import simulate_by_impulses
+from .impulse_stepping.impulse_simulation import simulate_by_impulses
 from .initial_state import InitialState, find_initial_state, start_time
 from .integration_intervals import Segment, known_breaks, laws_checked_in_steps, remark_on_checked_laws, whole_motion
 from .integration_options import STABILIZATION, Integration, Stepping, output_times, refuse_beyond_memory
@@ -140,7 +140,7 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
     begun.pace = StiffnessMonitor(
         float(o.t_end), AUTO_METHOD if mixed else str(o.method), partial(reason_against_implicit, begun)
     )
-    begun.pace.goes_on(begun.carried.get("by", ""))
+    begun.pace.resume_with(begun.carried.get("by", ""))
     follow = o.stabilization == "projection" and not has_guards(begun) and _fully_driven(begun)
     with progress_bar(o.progress, "simulating") as tell:
         result = integrate_motion(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -188,7 +188,9 @@ def integrate_motion(
         method = tableau(explicit_substitute(o.method))
         rows, interrupted = np.zeros((0, row_width(start.assembly))), False
         if start.pace is None or not start.pace.asked:
-            rows, interrupted = run_clock(start.assembly, clock, method, report, task, engine, start.pace, start.part)
+            rows, interrupted = run_compiled_loop(
+                start.assembly, clock, method, report, task, engine, start.pace, start.part
+            )
         if start.pace is not None and start.pace.asked and not start.part.paused:
             more, interrupted = integrate_events(here, o, row_width(start.assembly), report, engine, known)
             rows = np.concatenate([rows, more])
@@ -324,7 +326,7 @@ def row_width(a: Assembly) -> int:
     return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.rows.law) + len(s.prescribed)
 
 
-def run_clock(
+def run_compiled_loop(
     a: Assembly,
     clock: ex.StepState,
     method: Tableau,
@@ -362,7 +364,7 @@ def run_clock(
                 rows.append(buffer[:used].copy())
             reached = max(reached, (clock.real.t - first) / span)
             report(reached)
-            if clock.count.status != ex.RUNNING and not engine.hands_over(clock):
+            if clock.count.status != ex.RUNNING and not engine.falls_back(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count.accepted + clock.count.rejected - before

@@ -185,7 +185,7 @@ class CodeSelection:
         if t > self._first:
             self._choose(self._spent() * float((end - t) / (t - self._first)))
 
-    def hands_over(self, clock: ex.StepState) -> bool:
+    def falls_back(self, clock: ex.StepState) -> bool:
         """Return whether generated code failed and the general engine continues from the last step.
 
         The general engine either gets through, or leaves in the workspace the data for diagnosis.
@@ -366,7 +366,7 @@ class StiffnessMonitor:
         """Method with which a continued motion starts; empty for the default."""
         return self.back or self.now if self.mixed else ""
 
-    def goes_on(self, by: str) -> None:
+    def resume_with(self, by: str) -> None:
         """Continue a segment that ended with the method `carried`."""
         self.asked = by if self.mixed else ""
         self._goes_on = bool(self.asked)

@@ -140,7 +140,7 @@ class ClosureEquations:
         series = np.polynomial.chebyshev.chebfit(nodes, np.array(F), SAMPLES - 1)
         return _chebyshev_to_powers(SAMPLES) @ series / h ** np.arange(SAMPLES)[:, None]
 
-    def close(self, x: CurvePoint, retained: int | None = None) -> tuple[CurvePoint, JacobianRank, float] | None:
+    def project(self, x: CurvePoint, retained: int | None = None) -> tuple[CurvePoint, JacobianRank, float] | None:
         """Newton's method: (nearest point of the curve, rank there, distance), or None if it fails.
 
         Only the ``retained`` largest singular values are used (by default all but one), which excludes redundant rows.

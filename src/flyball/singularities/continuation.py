@@ -148,7 +148,7 @@ class CurveTracer:
     def step_from(self, node: CurveNode, h: float) -> CurveNode | None:
         """Node at the distance h (backwards if negative) from another; None if one step does not reach it."""
         predicted = self.c.at(self.c.moved(node.x, h * node.t + 0.5 * h * h * node.bend))
-        found = self.c.close(predicted)
+        found = self.c.project(predicted)
         if found is None or found[2] > 0.3 * abs(h) + 1e-9:
             return None
         new = self.node(node.s + h, found[0], found[1], node.t)
@@ -160,14 +160,14 @@ class CurveTracer:
     def off(self, x: CurvePoint, n: np.ndarray, bend: np.ndarray) -> CurveNode:
         """Regular node a small step from a point, in the direction n of one of its branches."""
         for h in (0.02, 0.01, 0.005, 0.002, 0.03, 5e-4):
-            found = self.c.close(self.c.at(self.c.moved(x, h * n + 0.5 * h * h * bend)))
+            found = self.c.project(self.c.at(self.c.moved(x, h * n + 0.5 * h * h * bend)))
             if found is not None and found[2] < 0.2 * h and found[1].values[self.c.columns - 2] > 1e-5 * h:
                 return self.node(h, found[0], found[1], n + h * bend)
         raise NotConverged(BRANCH_LOST)
 
-    def onto(self, x: CurvePoint, d: np.ndarray) -> CurveNode:
+    def node_after_step(self, x: CurvePoint, d: np.ndarray) -> CurveNode:
         """Regular node a step d from a point."""
-        found = self.c.close(self.c.at(self.c.moved(x, d)))
+        found = self.c.project(self.c.at(self.c.moved(x, d)))
         if found is None:
             raise NotConverged(BRANCH_LOST)
         return self.node(float(np.linalg.norm(d)), found[0], found[1], d)
@@ -191,7 +191,7 @@ class CurveTracer:
                 return way
             # After a whole turn the driver has another value.
             again = home is not None and abs(new.x.a - home.x.a) < HALF_TURN
-            if home is not None and again and new.s - first.s > 4.0 * self.step and self._home(new, home):
+            if home is not None and again and new.s - first.s > 4.0 * self.step and self._is_closed(new, home):
                 way.end = "closed"
                 return way
             h = min(2.0 * (new.s - last.s), self._longest(new))
@@ -214,7 +214,7 @@ class CurveTracer:
             f"leads to a neighbouring position"
         )
 
-    def _home(self, node: CurveNode, home: CurveNode) -> bool:
+    def _is_closed(self, node: CurveNode, home: CurveNode) -> bool:
         d = self.c.way(node.x, home.x)
         h = float(d @ node.t)
         if abs(h) > 2.0 * self.step or np.linalg.norm(d - h * node.t) > 0.3 * self.step or node.t @ home.t < 0.7:
@@ -227,18 +227,18 @@ class CurveTracer:
         ds = n.s - m.s
         least = interior_minimum(m.value, m.slope, n.value, n.slope, ds)
         if least is not None and least[1] < 0.8 * min(m.value, n.value):
-            self._lost(m, n, least[0], way)
+            self._locate_branch_point(m, n, least[0], way)
         if max(abs(m.drive), abs(n.drive)) < STATIONARY_DRIVER:
             return
         if m.drive * n.drive < 0.0:
-            self._turned(m, n, way)
+            self._locate_turning_point(m, n, way)
             return
         sign = 1.0 if m.drive + n.drive > 0.0 else -1.0
         least = interior_minimum(sign * m.drive, sign * m.bend[-1], sign * n.drive, sign * n.bend[-1], ds)
         if least is not None and least[1] < 0.5 * min(abs(m.drive), abs(n.drive)):
-            self._touched(m, n, way)
+            self._locate_double_root(m, n, way)
 
-    def _lost(self, m: CurveNode, n: CurveNode, u: float, way: TracedCurve) -> None:
+    def _locate_branch_point(self, m: CurveNode, n: CurveNode, u: float, way: TracedCurve) -> None:
         middle = self.step_from(m, u * (n.s - m.s)) or m
         for near in (middle, m, n):
             values = self.c.rank(near.x).values[: self.c.columns - 1]
@@ -252,7 +252,7 @@ class CurveTracer:
         ds = n.s - m.s
         return bool(max(np.linalg.norm(self.c.way(k.x, x)) for k in (m, n)) < 1.2 * ds + 1e-9)
 
-    def _turned(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
+    def _locate_turning_point(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
         """Root of the driver's component of the tangent, by bracketed secant steps."""
         from scipy.optimize import brentq
 
@@ -271,7 +271,7 @@ class CurveTracer:
         if at[0] is not None:
             self._note(s, at[0].x, way)
 
-    def _touched(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
+    def _locate_double_root(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
         """Minimum of the driver's component of the tangent: two roots, a double one, or none."""
         low, high = m, n
         sign = 1.0 if m.drive > 0.0 else -1.0
@@ -280,8 +280,8 @@ class CurveTracer:
             if middle is None:
                 return
             if sign * middle.drive < 0.0:
-                self._turned(m, middle, way)
-                self._turned(middle, n, way)
+                self._locate_turning_point(m, middle, way)
+                self._locate_turning_point(middle, n, way)
                 return
             low, high = (middle, high) if sign * middle.bend[-1] < 0.0 else (low, middle)
             if high.s - low.s < 1e-14:

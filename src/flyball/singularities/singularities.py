@@ -127,7 +127,7 @@ def _start_point(
 def _snapped_to_singular(f: ReleasedMechanism, tracer: CurveTracer, x: CurvePoint) -> CurvePoint:
     """The singular position at the start if it is that within the tolerance; else the start."""
     c = f.closure
-    closed = c.close(x)
+    closed = c.project(x)
     if closed is not None and np.linalg.norm(c.way(x, closed[0])) < START_TOLERANCE:
         x = closed[0]
     r = c.rank(x)
@@ -154,7 +154,7 @@ def _traced_directions(
         return [TracedCurve(end="nothing leads away from here"), TracedCurve(end="nothing leads away from here")]
     if curve is not None:
         n, bend = curve.x[0], curve.x[1] if len(curve.x) > 1 else 0.0 * curve.x[0]
-        starts = [tracer.onto(x, d) for d in curve.ends]
+        starts = [tracer.node_after_step(x, d) for d in curve.ends]
         starts = starts or [tracer.off(x, side * n, bend) for side in (toward, -toward)]
         homes: list[CurveNode | None] = [None] * len(starts)
     else:
@@ -250,7 +250,7 @@ def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
     least, extra = np.inf, np.zeros((c.columns, 0))
     for y in random.normal(size=(12, N.shape[1])):
         d = 0.05 * N @ (y / np.linalg.norm(y))
-        near = c.close(c.at(c.moved(x, d)))
+        near = c.project(c.at(c.moved(x, d)))
         if near is not None and np.linalg.norm(c.way(x, near[0])) > 0.015:
             free = near[1].below(1e-6 * near[1].values[0])
             if free < least:

@@ -30,7 +30,7 @@ from ..results.equilibrium import (
     Equilibrium,
     Touch,
 )
-from ..simulation.impulse_stepping.impulse_motion import OutputRecorder, free_coordinates
+from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
 from ..simulation.impulse_stepping.setup import (
     MechanismMotion,
     make_stepper,
@@ -110,7 +110,7 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
     kept.add(False)
     q, v, vdot = free_coordinates(base, scene, kept)
     if held:
-        held.into(values, q, v, vdot)
+        held.write_into(values, q, v, vdot)
     return Assembly(base.compiled, base.t, q[-1], 0.0 * base.v)
 
 

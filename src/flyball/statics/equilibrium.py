@@ -42,12 +42,12 @@ from .controller_states import (
 )
 from .equilibrium_search import (
     LONGEST_STEP,
-    descent,
     equilibrium_result,
-    follow_forces,
     newton_search,
     newton_search_to,
-    pushed_off,
+    perturbed_along_softest,
+    pseudo_transient_descent,
+    pseudo_transient_search,
     search_failure,
 )
 from .equilibrium_search import find_steady_motion as turn
@@ -115,7 +115,9 @@ def controlled_rest(
         except AnalysisError:
             pass
     try:
-        return _searched_rest(model, _searched_rest(model, begin, follow_forces), newton_search_to).q, FOLLOWING_METHOD
+        return _searched_rest(
+            model, _searched_rest(model, begin, pseudo_transient_search), newton_search_to
+        ).q, FOLLOWING_METHOD
     except AnalysisError:
         raise why from None
 
@@ -346,13 +348,13 @@ def _searched_equilibrium(x: RestState, stable: bool) -> Equilibrium:
         shaky = error
     unstable = arrived is not None and stability(arrived).kind == UNSTABLE
     if arrived is not None and unstable and not stable and _differ_by_long_step(x, arrived):
-        downhill = descent(x)  # Newton's method has moved away from the guess, against the forces
+        downhill = pseudo_transient_descent(x)  # Newton's method has moved away from the guess, against the forces
         below = None if downhill is None else newton_search(downhill)
         if below is not None and stability(below).kind != UNSTABLE:
             return equilibrium_result(below, {}, "descent")
     if arrived is None or (stable and unstable):
         way = "descent"
-        downhill = descent(x if arrived is None else pushed_off(arrived))
+        downhill = pseudo_transient_descent(x if arrived is None else perturbed_along_softest(arrived))
         arrived = None if downhill is None else newton_search(downhill)
         if arrived is None:
             raise shaky or search_failure(downhill or x)

@@ -123,7 +123,7 @@ def _after_long_step(x: RestState, step: np.ndarray, lam: np.ndarray) -> RestSta
     if not size.max(initial=0.0) > LONGEST_STEP or (size > LONGEST_STEP)[x.turns].any():
         return None
     there = x.moved(step, lam)
-    return there if there.missing() < NEARLY_LINEAR * x.missing() else None
+    return there if there.residual_size() < NEARLY_LINEAR * x.residual_size() else None
 
 
 def equilibrium_there(x: RestState) -> RestState | None:
@@ -150,7 +150,7 @@ def _is_balanced_by_jump(x: RestState) -> bool:
     )
 
 
-def pushed_off(x: RestState, changed: RestState | None = None) -> RestState:
+def perturbed_along_softest(x: RestState, changed: RestState | None = None) -> RestState:
     """Move a small distance along the direction of lowest stiffness.
 
     If ``changed``, the state under later parameter values, is given, move it to the side that the forces push to. Just
@@ -172,7 +172,7 @@ def pushed_off(x: RestState, changed: RestState | None = None) -> RestState:
     return x.moved(PUSH_STEP * side * direction / largest, 0.0 * x.lam).closed()
 
 
-def descent(x: RestState) -> RestState | None:
+def pseudo_transient_descent(x: RestState) -> RestState | None:
     """Pseudo-transient continuation along the constraints; None if it fails."""
     x = x.closed()
     damping, left, way = FIRST_DAMPING, np.abs(x.r).max(initial=0.0), 0.0
@@ -196,14 +196,14 @@ def descent(x: RestState) -> RestState | None:
     return None
 
 
-def follow_forces(x: RestState) -> tuple[RestState | None, RestState]:
+def pseudo_transient_search(x: RestState) -> tuple[RestState | None, RestState]:
     """Pseudo-transient continuation without a potential, as for controllers: (state or None, last state).
 
     The implicit steps of a motion without inertia grow as the residual falls (switched evolution relaxation). Unlike in
-    `descent`, steps against the forces are accepted.
+    `pseudo_transient_descent`, steps against the forces are accepted.
     """
     x = x.closed()
-    damping, left = FIRST_DAMPING, x.missing()
+    damping, left = FIRST_DAMPING, x.residual_size()
     for _ in range(DESCENT_STEPS):
         if damping < LEAST_DAMPING or x.settled(FORCE_TOLERANCE):
             return x, x
@@ -217,7 +217,7 @@ def follow_forces(x: RestState) -> tuple[RestState | None, RestState]:
                 break
             continue
         x = x.moved(step, lam).closed()
-        before, left = left, x.missing()
+        before, left = left, x.residual_size()
         damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
     return None, x
 

@@ -29,11 +29,11 @@ from .equilibrium import rest_options
 from .equilibrium_search import (
     LONGEST_STEP,
     NEWTON_STEPS,
-    descent,
     equilibrium_result,
     equilibrium_there,
     newton_search,
-    pushed_off,
+    perturbed_along_softest,
+    pseudo_transient_descent,
     search_failure,
 )
 from .stability import RestState, stability
@@ -163,7 +163,7 @@ class _SeriesBranch:
         if halvings:
             middle = here + 0.5 * (there - here)
             return self.follow(self.follow(x, here, middle, halvings - 1), middle, there, halvings - 1)
-        return self.jump(x, there, lambda: pushed_off(x, self.at(x, there)))
+        return self.jump(x, there, lambda: perturbed_along_softest(x, self.at(x, there)))
 
     def controlled(self, last: Equilibrium, here: float, there: float, halvings: int) -> Equilibrium:
         """Equilibrium with controllers, searched from the last one; the step is halved if the result is far away."""
@@ -185,12 +185,12 @@ class _SeriesBranch:
     def settled(self, x: RestState, value: float) -> RestState:
         """The state itself, or the stable equilibrium it moves to if stability is required and it is unstable."""
         if self.stable and stability(x).kind == UNSTABLE:
-            return self.jump(x, value, lambda: pushed_off(x))
+            return self.jump(x, value, lambda: perturbed_along_softest(x))
         return x
 
     def jump(self, x: RestState, value: float, begin: Callable[[], RestState]) -> RestState:
         """Equilibrium that the forces lead to from one that no longer exists."""
-        downhill = descent(begin())
+        downhill = pseudo_transient_descent(begin())
         y = None if downhill is None else newton_search(downhill)
         if y is None:
             raise search_failure(downhill or x)

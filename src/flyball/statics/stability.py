@@ -119,7 +119,7 @@ class RestState:
         """Which velocities are rotations, (nv,) bool."""
         return np.array([n.unit == "rad" for n in velocity_names(self.c.structure)], bool)
 
-    def missing(self) -> float:
+    def residual_size(self) -> float:
         """Largest residual force relative to the applied forces, plus the largest constraint gap."""
         return float(np.abs(self.r).max(initial=0.0) / self.size + np.abs(self.g).max(initial=0.0))
 

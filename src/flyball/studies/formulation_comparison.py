@@ -38,7 +38,7 @@ from ..simulation.method_choice import (
     in_suitable_coordinates,
 )
 from ..simulation.motion_result import make_result
-from ..simulation.simulate import clock_for, row_width, run_clock
+from ..simulation.simulate import clock_for, row_width, run_compiled_loop
 from ..simulation.solver_switching import CodeSelection
 from ..tables.law_inputs import nonsmooth_elements
 
@@ -304,7 +304,7 @@ def _run_loop(
         engine = CodeSelection(start.assembly.compiled, False)
         rows, interrupted = integrate_events(here, o, row_width(start.assembly), no_progress, engine, NO_BREAKPOINTS)
     else:
-        rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), no_progress, INTEGRATE)
+        rows, interrupted = run_compiled_loop(start.assembly, clock, tableau(o.method), no_progress, INTEGRATE)
     taken = time.thread_time() - begun
     if interrupted:
         raise KeyboardInterrupt

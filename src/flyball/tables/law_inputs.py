@@ -206,7 +206,7 @@ class NonsmoothPoints:
             slots |= {inputs[0]: m, inputs[1]: len(s.measured) + m}
 
         def corner(u: SyntaxNode) -> tuple[int, float]:
-            data = self.zigzag(u.value) if u.kind == "table" else []
+            data = self.knot_guard_table(u.value) if u.kind == "table" else []
             if data is None:
                 return 0, 1.0
             key = _resolved(u, slots)
@@ -224,7 +224,7 @@ class NonsmoothPoints:
 
         return corner
 
-    def zigzag(self, name: str) -> list[float] | None:
+    def knot_guard_table(self, name: str) -> list[float] | None:
         """Table that is zero at each knot of another table, and only there; None if that has no such knots."""
         table = next(x for x in self.s.model.tables if x.name == name)
         data = np.array(table.data())

@@ -383,7 +383,7 @@ class EventDrivenMotion:
         if self.stops.sample(*here.c.buffers, here.clock) != 0:
             here.clock.count.status = ex.STEP_FAILED
             return True
-        self.jumped(before)
+        self.resolve_force_jump(before)
         if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             self.rows[-1][-1] = self.row()
         return True
@@ -480,7 +480,7 @@ class EventDrivenMotion:
             self.event()
         elif status == ex.DONE:
             return self.arrived()
-        elif status != ex.RUNNING and not engine.hands_over(clock) and not self.turned():
+        elif status != ex.RUNNING and not engine.falls_back(clock) and not self.turned():
             return True
         self.turned()
         self.intervals.whole()
@@ -510,7 +510,7 @@ class EventDrivenMotion:
         if not self.intervals.next():
             return True
         if sharp:
-            self.jumped(before)
+            self.resolve_force_jump(before)
             self.turned()
         return False
 
@@ -572,10 +572,10 @@ class EventDrivenMotion:
         if isinstance(self.loop, GuardedLoop):
             here.astray = missed_crossings(here, self.loop)
             note_fired_zeros(here, self.loop)
-        self.happens(fired)
+        self.resolve(fired)
         here.astray, here.nothing = frozenset(), {}
 
-    def happens(self, fired: Sequence[int]) -> None:
+    def resolve(self, fired: Sequence[int]) -> None:
         """Resolve the instant at which these guards triggered."""
         here, clock = self.here, self.here.clock
         system, before = here.c.system, here.v.copy()
@@ -600,9 +600,9 @@ class EventDrivenMotion:
             clock.real.h = min(clock.real.h, clock.real.wide or clock.real.h)
             here.fresh = False
         if over and here.t > at:  # laws may jump at the same instant
-            self.jumped(was)
+            self.resolve_force_jump(was)
 
-    def jumped(self, before: Mapping[int, float]) -> None:
+    def resolve_force_jump(self, before: Mapping[int, float]) -> None:
         """Resolve the instant after a possible jump of forces.
 
         Active rows may have to open, and stops at their bound may be pressed. No guard has crossed zero there.
@@ -616,7 +616,7 @@ class EventDrivenMotion:
         at = sides & (np.abs(values) <= CONTACT_TOLERANCE * n.unit[np.where(sides, of, 0)]) if sides.any() else sides
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HELD_GUARDS)) | at)
         if fired := [*against.tolist(), *passed_at_jump_time(here, before)]:
-            self.happens(fired)
+            self.resolve(fired)
         here.nothing = {}
 
     def stop(self) -> None:

@@ -231,7 +231,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
     leaving = [s for s, side in at.items() if not still[s] and len(side) == 1]
     if not leaving:
         return over
-    n.ask(MOTION)
+    n.run_engine(MOTION)
     nq = n.S.sizes.coordinates
     a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
     far = ORIGIN_ROUNDING * np.abs(n.W.FK[:, :3]).max(initial=0.0)

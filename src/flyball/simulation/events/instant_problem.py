@@ -186,7 +186,7 @@ class InstantProblem:
             before = a if step == 0.0 else before
             out[which] = np.fmax(out[which], np.abs(a - before))
         self.W.modes.mode[:] = modes
-        self.ask(MOTION)
+        self.run_engine(MOTION)
         return out
 
     def of(self, *kinds: int) -> list[int]:
@@ -216,7 +216,7 @@ class InstantProblem:
         self.desk.real.t = self.here.t
         self.desk.y[0] = self.here.y
 
-    def ask(self, task: int) -> int:
+    def run_engine(self, task: int) -> int:
         """Run a task of the engine at the state of the motion, on a copy of it."""
         self.put()
         return self.engine(task)
@@ -238,7 +238,7 @@ class InstantProblem:
         """Switch off all decided switches."""
         self.W.modes.mode[self.decided] = OFF
 
-    def slide(self, parts: list[ProblemRow]) -> None:
+    def set_sliding(self, parts: list[ProblemRow]) -> None:
         """Set the sliding direction of friction that is no row of the problem; friction of its rows acts by them
         alone.
         """
@@ -254,7 +254,7 @@ class InstantProblem:
         out, nv, nr = self.output.rows, len(force), len(self.S.rows.law)
         out[:2] = 0.0
         out[0, :nv] = force
-        self.ask(SOLVE)
+        self.run_engine(SOLVE)
         return out[2, :nv].copy(), out[3, :nr].copy(), self.W.velocities.effort.copy()
 
     def gradients(self, which: np.ndarray) -> np.ndarray:
@@ -282,7 +282,7 @@ class InstantProblem:
             P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.lean, part.const, part.state
             if part.of >= 0:
                 P.gain[i, part.of] = part.gain
-        self.slide(parts)
+        self.set_sliding(parts)
         self.put()
         status = room.do(FREE_MOTION)
         P.grain[:] += FAINT_ACCELERATION * self.negligible_acceleration[B.which] + self.acceleration_rounding[B.which]
@@ -304,14 +304,14 @@ class InstantProblem:
         """Solve it again from the states stored in it, with the present friction limits. Returns the solver status."""
         return self.workspaces[len(P.b)].do(RESUME_SOLVE)
 
-    def arrive(self) -> None:
+    def project(self) -> None:
         """Project the state onto the active rows."""
-        if self.ask(ARRIVE) == 0:
+        if self.run_engine(ARRIVE) == 0:
             self.here.y[:] = self.desk.y[0]
 
     def guards(self) -> np.ndarray:
         """Return the values of all guards, (ng,)."""
-        self.ask(GUARD_VALUES)
+        self.run_engine(GUARD_VALUES)
         out = self.output.rows[0, : len(self.S.guards.kind)].copy()
         if self.shares:
             out[-1] = margin_kernel(*self.tables, self.here.t, self.here.group)

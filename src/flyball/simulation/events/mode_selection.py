@@ -77,7 +77,7 @@ def activate_pressing_rows(n: InstantProblem, found: ModeDecision) -> None:
     here, y, t = n.here, n.here.y.copy(), n.here.t
     B, _, _ = n.problem(parts)
     a = B.free + found.x @ B.Y
-    n.ask(MOTION)
+    n.run_engine(MOTION)
     nq, nv = len(here.q), len(a)
     q_dot = n.desk.K[0, :nq].copy()
     span, step = here.clock.real.span, here.clock.real.h

@@ -179,16 +179,16 @@ class Corners:
 
     def begin(self) -> None:
         """Set the sides at the start of the motion."""
-        self.n.ask(MOTION)
+        self.n.run_engine(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
             if self.n.W.modes.mode[s] != OFF and abs(u) <= HISTORY_FACTOR * max(least, corner_at(self.n, s).grain):
                 self.at.add(s)  # it stays held
                 continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
-            if abs(u) <= self._nothing(s, u, least):
+            if abs(u) <= self._rounding_of(s, u, least):
                 self.at.add(s)
-        self.n.ask(MOTION)
+        self.n.run_engine(MOTION)
 
     def fired(self, guards: np.ndarray) -> None:
         """Note the guards that triggered, and the velocities at that time."""
@@ -202,14 +202,14 @@ class Corners:
         n, real = self.n, self.n.here.clock.real
         if not found:
             return found
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         now = {s: self.value(s) for s in sorted(found)}
         off = [s for s, (u, least) in now.items() if abs(u) > HISTORY_FACTOR * max(least, corner_at(n, s).grain)]
         if not off:
             return set()
         h = self._lookahead()
         fast = {s: abs(u - now[s][0]) / h for s, (u, _) in zip(off, self._predicted_values(off), strict=True)}
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         late = THROWN_FACTOR * TIME_RESOLUTION * max(n.here.t, float(real.span))
         return {s for s in off if abs(now[s][0]) > late * fast[s]}
 
@@ -225,7 +225,7 @@ class Corners:
         n, ways = self.n, self.n.ways()
         before, modes = ways[self.all].copy(), n.W.modes.mode[self.all].copy()
         self.at -= self._moved_off_by_jump()
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         for s in self.all.tolist():
             if s in self.at:
                 continue
@@ -235,7 +235,7 @@ class Corners:
                     self.at.add(s)
                     continue
                 n.W.modes.mode[s] = OFF
-            if abs(u) > self._nothing(s, u, least):
+            if abs(u) > self._rounding_of(s, u, least):
                 ways[s] = np.sign(u)
             else:  # for example a rate that was held at zero: its sign is rounding, but its direction now is not
                 self.at.add(s)
@@ -255,10 +255,10 @@ class Corners:
         n, v = self.n, self.n.here.v.copy()
         if not self.at or (v == self.velocity_at_guard).all():
             return set()
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         now = {s: self.value(s) for s in self.at}
         n.here.v[:] = self.velocity_at_guard
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         then = {s: self.value(s)[0] for s in self.at}
         n.here.v[:] = v
         return {
@@ -275,7 +275,7 @@ class Corners:
             size += abs(W.sensed[VALUE, m] * corner_derivatives(self.n, s, m)[1])
         return float(corner_value(S, W, t, s)), CORNER_ROUNDING * float(size)
 
-    def _nothing(self, s: int, u: float, least: float) -> float:
+    def _rounding_of(self, s: int, u: float, least: float) -> float:
         """Return the size of u below which its sign is rounding, including that of rates that may be held."""
         if abs(u) <= least or not (found := corner_at(self.n, s)).rates:
             return least
@@ -285,7 +285,7 @@ class Corners:
         """Return the rates of u of these corners for these sides; for those in ``second`` the second derivatives."""
         n = self.n
         n.ways()[which] = signs
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         n.W.modes.mode[second] = STEADY
         corner_rates(n.S, n.W, n.here.t)
         n.W.modes.mode[second] = OFF
@@ -296,7 +296,7 @@ class Corners:
         d = self.rates(which, np.zeros(len(which)), second)
         B = self._effects(which, d, second)
         size = np.abs(d) + np.abs(B).sum(axis=1)
-        B[np.abs(B) <= np.maximum(LEVEL_RATE * size[:, None], self._of_rounding(which, second, B))] = 0.0
+        B[np.abs(B) <= np.maximum(LEVEL_RATE * size[:, None], self._rounding_part(which, second, B))] = 0.0
         old = self.sides[which]
         left = np.array([self.old[s] != OFF for s in which]) & (np.abs(np.abs(old) - 1.0) <= SIDE_REACHED)
         sides = _relaxed_branches(d, B, old)
@@ -314,14 +314,14 @@ class Corners:
         """Return the effect of each side on each rate, beyond d."""
         return np.column_stack([self.rates(which, e, second) - d for e in np.eye(len(which))])
 
-    def _of_rounding(self, which: list[int], second: list[int], B: np.ndarray) -> np.ndarray:
+    def _rounding_part(self, which: list[int], second: list[int], B: np.ndarray) -> np.ndarray:
         """Return the part of B caused by the residual of u: the side of abs(u) has no effect where u is zero."""
         n, out, v = self.n, np.zeros_like(B), self.n.here.v.copy()
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         held = [(s, at) for s in which if (at := corner_at(n, s)).rates and abs(self.value(s)[0]) <= at.still]
         for _, at in held:
             n.here.v[:] = v
-            n.ask(MOTION)
+            n.run_engine(MOTION)
             remove_rates(n, at.row[None], np.array([-HISTORY_FACTOR * at.still]))
             other = self._effects(which, self.rates(which, np.zeros(len(which)), second), second)
             out += np.abs(other - B) / HISTORY_FACTOR
@@ -345,15 +345,15 @@ class Corners:
         for k in np.flatnonzero(flat & ~found.left):
             self._choose_side_by_trial(which, int(k), sides, self.sides[which])
         if len(which) > 1:
-            self._goes_on([s for s, going in zip(which, ~held & ~found.left, strict=True) if going], found)
-        n.ask(MOTION)
+            self._refuse_unresolved([s for s, going in zip(which, ~held & ~found.left, strict=True) if going], found)
+        n.run_engine(MOTION)
         return bool(found.B.any())
 
     def ended(self, found: CornerProblem) -> CornerProblem:
         """Return the problem with the corners on which oscillations have ended: the motion may rest on these."""
         n, y, ways = self.n, self.n.here.y.copy(), self.n.ways().copy()
         n.ways()[found.which] = found.sides
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         maybe = [
             (s, float(found.d[k]), at)
             for k, s in enumerate(found.which)
@@ -370,7 +370,7 @@ class Corners:
         rates = {s: rate for s, rate, _ in maybe}
         before = {s: self.value(s)[0] for s in self.all.tolist()}
         remove_rates(n, np.array([corner_at(n, s).row for s in second]), np.array([rates[s] for s in second]))
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         also = [s for s in before if s not in self.at and abs(self.value(s)[0]) <= SAME_RATE * abs(before[s])]
         other = self.pushed(sorted({*found.which, *also}), second)
         ends = all(
@@ -392,7 +392,7 @@ class Corners:
         """
         n, W = self.n, self.n.W
         inverse = inverse_of_slopes(found.B[np.ix_(found.held, found.held)])
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         rows = np.array([corner_at(n, s).row for s in which])
         misses = np.array(
             [corner_derivatives(n, s, BY_MOTION)[1] if s in found.second else self.value(s)[0] for s in which]
@@ -400,7 +400,7 @@ class Corners:
         for i, s in enumerate(which):
             W.modes.mode[s] = STEADY if s in found.second else HELD
             W.modes.inverse_slopes[which, s] = inverse[:, i]
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         remove_rates(n, rows, misses)
 
     def _choose_side_by_trial(self, which: list[int], k: int, signs: np.ndarray, old: np.ndarray) -> None:
@@ -419,14 +419,14 @@ class Corners:
         t, y, real = n.here.t, n.here.y.copy(), n.here.clock.real
         h = self._lookahead()
         for part in (0.5, 1.0):
-            n.ask(MOTION)
+            n.run_engine(MOTION)
             real.t, n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
-        n.ask(MOTION)
+        n.run_engine(MOTION)
         out = [self.value(s) for s in which]
         real.t, n.here.y[:] = t, y
         return out
 
-    def _goes_on(self, which: list[int], found: CornerProblem) -> None:
+    def _refuse_unresolved(self, which: list[int], found: CornerProblem) -> None:
         """Refuse a point where several corners meet and every choice of sides leads back at once."""
         n = self.n
         back = [

@@ -115,7 +115,7 @@ def _move_freely(n: InstantProblem, s: int) -> None:
 
 def _switch_acceleration(n: InstantProblem, s: int) -> float:
     """Return the second derivative of a quantity with the present modes."""
-    n.ask(MOTION)
+    n.run_engine(MOTION)
     nq = n.S.sizes.coordinates
     vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
     return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
@@ -403,7 +403,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
             continue
         release_ratchets(n, hits)
         remove_residual_rates(n, found)
-        n.arrive()
+        n.project()
         if jumped is not None and (
             jumped.external_impulses or jumped.given or not jumped.closing.keys() <= here.astray
         ):
@@ -519,10 +519,10 @@ def remove_slight_overlaps(n: InstantProblem) -> None:
     y, modes, hold = n.here.y.copy(), n.W.modes.mode.copy(), n.W.modes.hold.copy()
     for s, (side, _) in over.items():
         n.W.modes.mode[s], n.W.modes.hold[s] = HELD, side
-    n.arrive()
+    n.project()
     n.W.modes.mode[:], n.W.modes.hold[:] = modes, hold
     n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
-    n.arrive()  # project the velocities onto the joints' rows at the new positions
+    n.project()  # project the velocities onto the joints' rows at the new positions
     n.evaluate_switches()
     n.restore_modes()
     told = {s: x for s, (_, x) in over.items() if x > REPORTED_OVERLAP * n.unit[s]}

@@ -133,7 +133,7 @@ class ImplicitIntegrator:
             if self.clock.count.step_status != 0
             else f"what happens within a step of {step:g} s cannot be told: between its ends it is too far off"
         )
-        if steep := self._steep():
+        if steep := self._steep_laws():
             why += f" (the slope of {' and of '.join(steep)} may be infinite there)"
         return SimulationError(f"at t = {t:.6g} s {why}; give a shorter step, or leave it out", t=t)
 
@@ -165,9 +165,9 @@ class ImplicitIntegrator:
         real.stays = 2.0 if x.expensive else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count.least, count.index_3 = 2 if turns else 1, int(x.index_3)
         count.shared = int(x.first[SIZES]) if len(x.pressing) else 0
-        count.infinite_slopes = int(len(self._steep()) > 0)
+        count.infinite_slopes = int(len(self._steep_laws()) > 0)
 
-    def _steep(self) -> list[str]:
+    def _steep_laws(self) -> list[str]:
         s = self.layout.s
         return s.kept.get("steep laws", None, 1, lambda: steep_law_names(s.model))
 
@@ -190,12 +190,12 @@ class ImplicitIntegrator:
         nA, nL, nU = len(P.Aj), len(P.Lj), len(P.Uj)
         return RadauStepWorkspace(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(3, nr), z(4, nr), z(4, nz),
-            z(4, nz), z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx), self._plain(), z(3, n), w(3, n),
-            J, springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            z(4, nz), z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx),
+            self._coordinate_of_velocity(), z(3, n), w(3, n), J, springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 
-    def _plain(self) -> np.ndarray:
+    def _coordinate_of_velocity(self) -> np.ndarray:
         """Return for each velocity the component of the state whose rate it is, or -1 for angular velocities."""
         out = np.full(self.layout.nv, -1, np.int64)
         tree = self.system.tree

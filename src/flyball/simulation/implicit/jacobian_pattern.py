@@ -57,22 +57,28 @@ class DependencePattern:
             own = np.arange(v, v + nv)
             self.chain.append(np.r_[own, self.chain[parent]] if parent >= 0 else own)
         self.entries = [S.column[S.row_start[k] : S.row_start[k + 1]] for k in range(self.nr + nm)]
-        self.row = [self._hung(np.unique(self.body[e])) for e in self.entries]
+        self.row = [self._velocities_of_bodies(np.unique(self.body[e])) for e in self.entries]
         states = s.nv + np.arange(nx)
-        self.told = np.r_[self._read(s, s.slots, nm), states]
+        self.told = np.r_[self._velocities_of_names(s, s.slots, nm), states]
         self.bodies = [(c, np.unique(c)) for c in self.chain]
-        self.all = [*self.bodies, *self._between(), *zip(self.entries[: self.nr], self.row[: self.nr], strict=True)]
-        self.all += self._along()
+        self.all = [
+            *self.bodies,
+            *self._two_point_forces(),
+            *zip(self.entries[: self.nr], self.row[: self.nr], strict=True),
+        ]
+        self.all += self._coordinate_forces()
         laws = [x.law.names for x in s.controls[:nx]]
-        self.states = [(states[n : n + 1], np.r_[self._read(s, names, nm), states]) for n, names in enumerate(laws)]
+        self.states = [
+            (states[n : n + 1], np.r_[self._velocities_of_names(s, names, nm), states]) for n, names in enumerate(laws)
+        ]
         self.rates = [(np.array([s.nv + nx + k]), row) for k, row in enumerate(self.row[: self.nr])]
 
-    def _read(self, s: Structure, names: Iterable[str], nm: int) -> np.ndarray:
+    def _velocities_of_names(self, s: Structure, names: Iterable[str], nm: int) -> np.ndarray:
         """Return the velocities on which measured quantities depend, given the names used in laws."""
         columns = {s.slots[name] for name in names if name in s.slots}
         return _union_of([self.row[self.nr + m % nm] for m in sorted(columns) if m < 2 * nm])
 
-    def _hung(self, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
+    def _velocities_of_bodies(self, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
         """Return the velocities of bodies and of all bodies that carry them."""
         return _union_of([self.chain[b] for b in bodies])
 
@@ -80,16 +86,16 @@ class DependencePattern:
         """Return these velocities with those that the laws of force k depend on."""
         return np.union1d(velocities, self.told) if (self.S.forces.laws[k] >= 0).any() else velocities
 
-    def _between(self) -> list[Dependence]:
+    def _two_point_forces(self) -> list[Dependence]:
         out, forces = [], self.S.forces
         for k, family in enumerate(forces.family):
             if family == BETWEEN:
                 ends = [b for b in self.S.frame_body[[forces.M[k], forces.F[k]]] if b >= 0]
-                depends = self._law(k, self._hung(ends))
+                depends = self._law(k, self._velocities_of_bodies(ends))
                 out += [(self.chain[b], depends) for b in ends]
         return out
 
-    def _along(self) -> list[Dependence]:
+    def _coordinate_forces(self) -> list[Dependence]:
         out, forces = [], self.S.forces
         for k, family in enumerate(forces.family):
             if family not in (ALONG, SLIDING):
@@ -232,11 +238,11 @@ class JacobianLayout:
         groups = [one, scaled, soft]
         i, j, number = (np.concatenate([e[k] for g in groups for e in g]).astype(np.int64) for k in range(3))
         count = [sum(len(e[0]) for e in g) for g in groups]
-        self._whole(i, j, number, count)
+        self._coupled_stages(i, j, number, count)
         self.P, self.put = self._ordered(n, i, j, number, 1)
         self.part = np.cumsum(count)[:2].astype(np.int64)
 
-    def _whole(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
+    def _coupled_stages(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
         """Set the same for all three stages at once, which F' couples."""
         n = self.n
         own, scaled = np.r_[: count[0], sum(count[:2]) : sum(count)], np.arange(count[0], sum(count[:2]))
@@ -261,14 +267,16 @@ class JacobianLayout:
         rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
         groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
         order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
-        one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # those of a quaternion together
+        one = np.r_[
+            self._quaternion_groups(), self.nv + np.arange(n // stages - self.nv)
+        ]  # those of a quaternion together
         first = np.tile(np.arange(n // stages) < self.nv, stages)
         place = np.empty(n, np.int64)
         place[np.lexsort((np.arange(n), np.where(first, np.tile(one, stages), order), ~first))] = np.arange(n)
         P, at = analyse_lu(n, i, j, place)
         return P, np.ascontiguousarray(np.column_stack([at, number]))
 
-    def _together(self) -> np.ndarray:
+    def _quaternion_groups(self) -> np.ndarray:
         """Return for each velocity the first of those whose increments are coupled."""
         out = np.arange(self.nv)
         for w in self.turns.tolist():

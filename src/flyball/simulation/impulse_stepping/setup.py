@@ -12,8 +12,8 @@ from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import compile_mechanism
 from ...collision.tables import RADIUS, Movers
 from ...engine.calls import OutputBuffer
-from ...engine.projection import STEPS
 from ...engine.residual import DIRECTIONS, SLOPE_WIDTH
+from ...engine.stabilization import STEPS
 from ...errors import ModelError
 from ...forces.coordinate_spring import measuring_spring
 from ...forces.limit import Limit
@@ -314,7 +314,9 @@ class MechanismMotion:
         self.gaps.append(float(np.abs(W.rows.value).max(initial=0.0)))
         self.slips.append(float(np.abs(lost).max(initial=0.0)))
 
-    def into(self, whole: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def write_into(
+        self, whole: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Write its coordinates, velocities and accelerations into those of the whole model; return its states and
         multipliers.
 

@@ -241,20 +241,20 @@ class Stepper:
             began = time.perf_counter()
             asked = count[STEPS_LEFT] = min(steps, self.quota)
             self.pace.real[LONGEST_STEP] = h
-            self._next(h)
+            self._set_step(h)
             try:
                 self._call_loop()
             except (NoSolution, StepTooLong) as reason:
                 left = int(count[STEPS_LEFT])
                 stuck = isinstance(reason, NoSolution)
-                self._in_halves(h, MOST_HALVINGS if stuck else MOST_IMPACT_HALVINGS)
+                self._halve_step(h, MOST_HALVINGS if stuck else MOST_IMPACT_HALVINGS)
                 self.halved += stuck
                 count[STEPS_LEFT] = left - 1
             steps -= int(asked - count[STEPS_LEFT])
             took = max(time.perf_counter() - began, 1e-6)
             self.quota = int(max(1, min(4 * self.quota, self.quota * CALL_SECONDS / took, MOST_STEPS_PER_CALL)))
 
-    def _next(self, h: float) -> None:
+    def _set_step(self, h: float) -> None:
         """Set the length of the next steps, and the allowed residual of their velocities.
 
         In a step so short that gravity causes less velocity than that residual, resting bodies would not be supported.
@@ -263,20 +263,20 @@ class Stepper:
         falls = REST_SHARE * h * float(np.linalg.norm(real[GRAVITY : GRAVITY + 3]))
         real[STEP], real[VELOCITY_TOLERANCE] = h, min(self.enough, falls) if falls > 0.0 else self.enough
 
-    def _in_halves(self, h: float, depth: int) -> None:
+    def _halve_step(self, h: float, depth: int) -> None:
         """Take a step of h, which has no solution, as two; at the last depth without requiring convergence."""
         if depth == 0:
             raise NoSolution
         divides = int(self.pace.count[DIVIDES_STEPS])
         for _ in range(2):
-            self._next(0.5 * h)
+            self._set_step(0.5 * h)
             self.pace.count[STEPS_LEFT] = 1
             self.joints.count.accept_unsettled = depth == 1
             self.pace.count[DIVIDES_STEPS] = divides and depth > 1
             try:
                 self._call_loop()
             except (NoSolution, StepTooLong):
-                self._in_halves(0.5 * h, depth - 1)
+                self._halve_step(0.5 * h, depth - 1)
         self.joints.count.accept_unsettled = 0
         self.pace.count[DIVIDES_STEPS] = divides
 

@@ -117,9 +117,9 @@ def harmonic_form(x: Node, angles: Sequence[Node], probe: Probe) -> Affine:
     for n in range(len(angles)):
         there, back, up = at(n, 1.0, 0.0), at(n, -1.0, 0.0), at(n, 0.0, 1.0)
         a, middle = 0.5 * (there - back), 0.5 * (there + back)
-        factors.append((probe.without_nothing(a, size), probe.without_nothing(up - middle, size)))
+        factors.append((probe.zero_if_negligible(a, size), probe.zero_if_negligible(up - middle, size)))
         k = k - factors[-1][0]
-    k = probe.without_nothing(k, size)
+    k = probe.zero_if_negligible(k, size)
     told = k
     for w, (a, b) in zip(angles, factors, strict=True):
         told = told + a * cos(w) + b * sin(w)
@@ -224,7 +224,7 @@ def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solutio
     a, b, c = (w.graph.node(y) for y in abc)
     if probe.zero(a):
         raise FormMismatch
-    b = w.graph.node(probe.without_nothing(b, probe.size(a)))
+    b = w.graph.node(probe.zero_if_negligible(b, probe.size(a)))
     D = 0.25 * b * b - a * c
     if not probe.at_start(D) > DEAD_CENTRE * abs(probe.at_start(a * c)):
         raise FormMismatch
@@ -382,7 +382,7 @@ class LoopSolver:
 
     def run(self) -> None:
         """Apply rules until none fits."""
-        rules = (self._follow_known, self._one, self._linear_in_two, self._linear, self._follow, self._pair)
+        rules = (self._follow_known, self._one, self._linear_in_two, self._linear, self._combine_angles, self._pair)
         self._plain()
         for _ in range(MAX_ROUNDS * len(self.unknowns)):
             if not any(rule() for rule in rules):
@@ -458,7 +458,7 @@ class LoopSolver:
         slope = directional_derivatives([x], [(w, 1.0)])[0]
         return not isinstance(slope, Node) or not any(self._depends(slope, y) for y in self.unknowns)
 
-    def _follow(self) -> bool:
+    def _combine_angles(self) -> bool:
         """Combine successive angles: if E_vw = E_ww, the equation E depends on w only through v + w."""
         return self._follows(itertools.permutations(self.unknowns, 2))
 
@@ -475,7 +475,7 @@ class LoopSolver:
                 if self._name(v, w, sign) not in self._substituted_sums and all(
                     self._sums(x, v, w, sign) for x in both
                 ):
-                    self._counted(v, w, sign)
+                    self._substitute_sum(v, w, sign)
                     return True
         return False
 
@@ -497,14 +497,14 @@ class LoopSolver:
     def _name(v: Node, w: Node, sign: float) -> str:
         return f"({v.data.name} + {w.data.name})" if sign > 0 else f"({w.data.name} - {v.data.name})"
 
-    def _counted(self, v: Node, w: Node, sign: float) -> None:
+    def _substitute_sum(self, v: Node, w: Node, sign: float) -> None:
         """Substitute v + w (or w - v) for w."""
         g = w.graph
         name = self._name(v, w, sign)
         self._substituted_sums.add(name)
         both = g.symbol(Symbol(name, "dependent", name, "rad"))
         start = self.probe.start
-        self.probe.know(both.data.name, start[w.data.name] + sign * start[v.data.name])
+        self.probe.set_initial(both.data.name, start[w.data.name] + sign * start[v.data.name])
         self.unknowns[self.unknowns.index(w)] = both
         value = both - sign * v
         self.later.append(Definition((w,), (value,), (), "counted from the link before"))

@@ -78,7 +78,7 @@ class Probe:
         with np.errstate(all="ignore"):
             return max(float(np.abs(self.values([x])).max()), self._terms(x))
 
-    def without_nothing(self, x: Any, size: float) -> Any:
+    def zero_if_negligible(self, x: Any, size: float) -> Any:
         """The expression, or 0 if it is zero compared with ``size``."""
         return 0.0 if self.zero(x, size) else x
 
@@ -90,7 +90,7 @@ class Probe:
         whole = round(float(found[0])) if np.isfinite(found[0]) else 0
         return float(whole) if whole and np.abs(found - whole).max() <= ZERO_TOLERANCE * abs(whole) else x
 
-    def know(self, name: str, value: float) -> None:
+    def set_initial(self, name: str, value: float) -> None:
         """Set the initial value of another symbol."""
         self.start = {**self.start, name: value}
 

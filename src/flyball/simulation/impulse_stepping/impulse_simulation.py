@@ -274,7 +274,7 @@ def make_impulse_result(
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.rows.law)))
     if recorder.held:
-        states, lam = recorder.held.into(values, q, v, vdot)
+        states, lam = recorder.held.write_into(values, q, v, vdot)
         health.violation, health.velocity_violation = max(recorder.held.gaps), max(recorder.held.slips)
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.final = (float(t[-1]), np.concatenate([q[-1], v[-1], states[-1]]))
