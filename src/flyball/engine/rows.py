@@ -208,7 +208,7 @@ def end_rows(S, W, t, v):
     update_measured_rates(S, W, v)
     for k in range(S.rows.law.shape[0]):
         W.rows.gamma[k] += W.rows.nu_dot[k]
-    finish_biases(S, W, t)
+    end_biases(S, W, t)
 
 
 @formula
@@ -278,7 +278,7 @@ def size_inactive_rows(S, W):
 
 
 @formula
-def start_biases(S, W, v):
+def begin_biases(S, W, v):
     """Start of the biases: rates of the measured quantities; gamma of the laws as far as they depend on time."""
     update_measured_rates(S, W, v)
     for m in range(count_measured(S)):
@@ -301,7 +301,7 @@ def update_measured_rates(S, W, v):
 
 
 @formula
-def finish_biases(S, W, t):
+def end_biases(S, W, t):
     """End of the biases: gamma of laws that read sensors uses f'' along the motion in place of the time derivative."""
     clear_inactive_biases(S, W)
     last = -1

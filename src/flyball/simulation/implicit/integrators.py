@@ -191,7 +191,8 @@ class ImplicitIntegrator:
         return RadauStepWorkspace(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(3, nr), z(4, nr), z(4, nz),
             z(4, nz), z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx),
-            self._coordinate_of_velocity(), z(3, n), w(3, n), J, springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            self._coordinate_of_velocity(), z(3, n), w(3, n), J, springy, x.put, x.part, z(nA), z(nL), z(nU),
+            z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 
