@@ -119,7 +119,7 @@ def main() -> None:
     other, here = Other(Path(arguments.checkout).resolve()), Other(HERE)
     rows = []
     file = HERE / "examples" / "slider_crank.toml"
-    asks: dict[str, Callable[[Other], float]] = {n: lambda o, n=n: o.run_engine(n) for n in here.names}  # type: ignore[misc]
+    asks: dict[str, Callable[[Other], float]] = {n: lambda o, n=n: o.ask(n) for n in here.names}  # type: ignore[misc]
     asks["import flyball"] = lambda o: o.fresh("import flyball")
     asks["load a model file"] = lambda o: o.fresh(f"import flyball; flyball.load({str(file)!r})")
     for name, ask in ((n, a) for n, a in asks.items() if arguments.only in n):

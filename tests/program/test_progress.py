@@ -144,14 +144,14 @@ def test_a_script_shows_it_on_a_terminal_only():
         with subprocess.Popen(
             [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=theirs, text=True, cwd=ROOT
         ) as run:
-            os.project(theirs)
+            os.close(theirs)
             said = b""
             while chunk := _read(ours):
                 said += chunk
             assert run.stdout is not None
             assert run.stdout.read() == "done\n"
     finally:
-        os.project(ours)
+        os.close(ours)
     assert b"simulating" in said
 
 

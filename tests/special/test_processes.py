@@ -90,7 +90,7 @@ def test_a_fork_goes_on_with_it():
             os.write(write, pickle.dumps(m.simulate(0.3, **WISH).q[-1]))
         finally:
             os._exit(0)
-    os.project(write)
+    os.close(write)
     with os.fdopen(read, "rb") as pipe:
         q = pickle.loads(pipe.read())
     os.waitpid(child, 0)

@@ -40,7 +40,7 @@ class Stepped:
         self.P.group[:] = A.group
         self.X, self.Y = allocate_solver(self.P)[0], allocate_solver(self.P)[0]
         A.door[0] = engine.address
-        self.run_engine(TASK_START)
+        self.ask(TASK_START)
 
     def ask(self, task, X=None):
         status = mechanism_kernel(self.A, self.M, self.C, self.P, self.X if X is None else X, task)
@@ -81,17 +81,17 @@ class Stepped:
                 self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
             X.line[:] = 0.0
-            self.run_engine(TASK_FREE_VELOCITIES)
-            self.run_engine(TASK_ROWS)
-            self.run_engine(TASK_BEGIN)
+            self.ask(TASK_FREE_VELOCITIES)
+            self.ask(TASK_ROWS)
+            self.ask(TASK_BEGIN)
             self.solve(X, P.bias[:n], P.mu[:n])
-            self.run_engine(TASK_APPLY_IMPULSES)
-            self.run_engine(TASK_MEAN_VELOCITIES, Y)
+            self.ask(TASK_APPLY_IMPULSES)
+            self.ask(TASK_MEAN_VELOCITIES, Y)
             bias = np.array([(found[c][4] / h + self.seen(Y, c)[0], 0.0, 0.0) for c in range(n)]).reshape(n, 3)
             Y.wide[:] = 0.0
             self.solve(Y, bias, np.zeros(n))
-            self.run_engine(TASK_FINISH, Y)
-            self.run_engine(TASK_FINAL_VELOCITIES)
+            self.ask(TASK_FINISH, Y)
+            self.ask(TASK_FINAL_VELOCITIES)
 
     def sides(self, c):
         """(sign, slice of velocities, J, Y) of each side of contact c that is in a group."""

@@ -25,7 +25,7 @@ def browser() -> Iterator[Any]:
     with sync_api.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
         yield browser
-        browser.project()
+        browser.close()
 
 
 class Opened:
@@ -92,4 +92,4 @@ def opened(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
 
     yield open_page
     for tab in tabs:
-        tab.project()
+        tab.close()

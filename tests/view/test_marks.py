@@ -114,7 +114,7 @@ def test_marks_on_the_page_s_plots(run, browser, tmp_path):
     page.tab.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 20)
     assert not tip.is_visible()
     assert page.errors == []
-    page.tab.project()
+    page.tab.close()
 
 
 def test_the_bar_of_the_page_tells_and_goes_there(run, browser, tmp_path):
@@ -132,4 +132,4 @@ def test_the_bar_of_the_page_tells_and_goes_there(run, browser, tmp_path):
     bar, tick = page.tab.locator(".bar .track").bounding_box(), ticks.nth(1).bounding_box()
     assert tick["x"] + tick["width"] / 2 == pytest.approx(bar["x"] + 7.5 + 0.6 * (bar["width"] - 15), abs=1.0)
     assert page.errors == []
-    page.tab.project()
+    page.tab.close()

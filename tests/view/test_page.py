@@ -156,4 +156,4 @@ def test_a_notebook_frame_runs_the_page(browser: Any, tmp_path: Path) -> None:
     assert tab.locator("iframe").bounding_box()["height"] == 500
     assert frame.locator("h1").inner_text() == "swing"
     assert frame.locator("button[name=play]").get_attribute("aria-label") == "Play"  # frames do not start by themselves
-    tab.project()
+    tab.close()
