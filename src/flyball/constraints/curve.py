@@ -34,7 +34,7 @@ def point(par, s, data):
 
 
 @formula
-def curve_point(par, F, M, hint, data):
+def foot(par, F, M, hint, data):
     """The parameter of the curve point nearest to M's origin by Newton's method from ``hint``: (p - c).c' = 0."""
     p = mtv(F[1], sub(M[0], F[0]))
     s = hint + 0.0 * p[0]
@@ -63,7 +63,7 @@ def local(par, F, M, s, data):
 
 
 @formula
-def curve_point_rate(par, F, M, s, data):
+def progress(par, F, M, s, data):
     """Return the rates of s and of the arc length at the nearest point."""
     _, t, delta, curvature, speed = local(par, F, M, s, data)
     along = dot(t, sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0]))))
@@ -78,7 +78,7 @@ def row(par, F, M, hint, data):
     deltadot = n.u + w_F.(n x d); besides the terms of an axis fixed in F, the bias contains curvature u_t^2 / (1 +
     curvature delta).
     """
-    s = curve_point(par, F, M, hint, data)
+    s = foot(par, F, M, hint, data)
     n, t, delta, curvature, _ = local(par, F, M, s, data)
     n = scale(par[3], n)
     d = sub(M[0], F[0])

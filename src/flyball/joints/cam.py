@@ -161,7 +161,7 @@ class Cam(Joint):
         guess = float(s[np.argmin((x - p[0]).real ** 2 + (y - p[1]).real ** 2)])
         zero = np.zeros(3)
         i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))
-        at = curve.curve_point(par, i, j, guess, data)
+        at = curve.foot(par, i, j, guess, data)
         delta = curve.local(par, i, j, at, data)[2]
         return at, -1.0 if delta.real < 0.0 else 1.0, absolute(delta)
 
