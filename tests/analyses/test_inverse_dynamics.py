@@ -302,7 +302,7 @@ def test_many_dependencies_are_counted_by_pivots(monkeypatch):
     m = windows(22)
     m.add(*[fb.Driver(f"drive{k}", f"A{k}.angle", "0.1*t") for k in range(22)])
     for module in (inverse_dynamics, sparse_rank):
-        monkeypatch.setattr(module, "DENSE", 0)
+        monkeypatch.setattr(module, "MAX_DOUBTFUL_SVD_SIZE", 0)
     found = m.inverse_dynamics([0.1])
     assert found.determinacy.count.tolist() == [66]
     assert len(found.determinacy.wrenches) == 88

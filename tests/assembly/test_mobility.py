@@ -169,10 +169,10 @@ def test_large_mechanisms_are_told_the_same(make, monkeypatch):
     a = assemble(m)
     dense = mobility(m, a)
     for module in (null_spaces, sparse_rank):
-        monkeypatch.setattr(module, "FEW", 0)
+        monkeypatch.setattr(module, "MAX_SVD_SIZE", 0)
     assert mobility(m, a) == dense
     for module in (null_spaces, sparse_rank):
-        monkeypatch.setattr(module, "DENSE", 0)
+        monkeypatch.setattr(module, "MAX_DOUBTFUL_SVD_SIZE", 0)
     assert mobility(m, a) == dense
 
 
@@ -240,7 +240,7 @@ def test_a_list_that_is_cut_says_so(monkeypatch):
 
     m = windows(5)
     a = assemble(m)
-    for name in ("FEW", "DENSE"):
+    for name in ("MAX_SVD_SIZE", "MAX_DOUBTFUL_SVD_SIZE"):
         monkeypatch.setattr(sparse_rank, name, 0)
     monkeypatch.setattr(sparse_rank, "ROOM", 700)  # 7 vectors of 100 rows
     found = mobility(m, a)

@@ -78,7 +78,7 @@ def test_beneath_the_floor_is_refused(monkeypatch, size):
         self.here.q[1] -= 1e-6 * size * (len(times) == 2)
         happens(self, fired)
 
-    monkeypatch.setattr(event_loop.EventDrivenMotion, "happens", sunk)
+    monkeypatch.setattr(event_loop.EventDrivenMotion, "resolve", sunk)
     with pytest.raises(fb.SimulationError, match=f"ground and 'b' are in each other by {1e-6 * size:.3g} m"):
         dropped(size, 9.81, 0.1, 0.5).simulate(3.0, method="dop853")
     assert len(times) == 2
