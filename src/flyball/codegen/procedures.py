@@ -38,7 +38,6 @@ from ..math.scalar import choose
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (
     ARTICULATED,
-    BEYOND_ROUNDING,
     BIAS,
     COUPLED,
     LAW_INPUT,
@@ -210,7 +209,7 @@ class SolveProcedures(ProcedureRecorder):
         reads: dict[int, Place] = {}
         if solver != ARTICULATED:
             reads |= self.again("H" if solver == SCHUR else "M") | self.again("L")
-            reads |= self.fresh("D", 0, range(len(W.D[0]))) | self.fresh("rows.diagonal", None, range(self.nr))
+            reads |= self.fresh("D", 0, range(len(W.D[0])))
         for name, is_loaded in (("STEP", True), ("STEP_UNLOADED", False)):
             self.stepped(name, is_loaded, reads)
         if solver != ARTICULATED:
@@ -270,14 +269,13 @@ class SolveProcedures(ProcedureRecorder):
         x, lam = x.copy(), lam.copy()
         if S.sizes.solver == SCHUR:
             pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
-            worst, *rows = residual_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
+            worst, off = residual_schur(S, W, gamma, x, W.velocities.scratch_2, self.semidefinite)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)
             f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
-            worst, *rows = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
-        places = [("W_flat", k) for k in (ROW_RESIDUAL, BEYOND_ROUNDING)]
-        self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, rows, strict=True)), worst)
+            worst, off = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+        self.add("REFINE", reads, [*self.solution(x, lam), (("W_flat", ROW_RESIDUAL), off)], worst)
 
     def drifted(self) -> None:
         """Add the constraint violation of velocities."""

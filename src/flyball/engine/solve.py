@@ -22,7 +22,6 @@ from ..math.scalar import choose, larger, magnitude, minimum
 from ..math.vec import load9, mv
 from ..numerics.sparse_factorisation import ldl_factor, ldl_solve
 from ..tables.table_definitions import (
-    BEYOND_ROUNDING,
     COUPLED,
     FACTOR,
     REFINE,
@@ -205,21 +204,30 @@ def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
     last = last_off = 1e300
     for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
         worst = call_generated(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
-        off, beyond = W.flat[ROW_RESIDUAL].real, W.flat[BEYOND_ROUNDING].real
-        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
+        off = W.flat[ROW_RESIDUAL].real
+        if not worst > W.options.solve_tolerance or is_stalled(W, lam, worst, last, off, last_off):
             break
         last, last_off = worst, off
     return worst
 
 
 @formula
-def is_stalled(worst, last, off, last_off, beyond):
-    """Whether another pass is useless; arguments as `residual_coupled` returns them, now and after the last pass.
+def is_stalled(W, lam, worst, last, off, last_off):
+    """Whether another pass is useless, by the residuals that `residual_coupled` returns, now and after the last pass.
 
     Where all accelerations are zero except for residuals, as at rest, the relative residual does not fall however small
-    they become. There the residual itself has to fall.
+    they become. There gamma - G x has to fall, as long as it is above the rounding that the multipliers cause in
+    x = M^-1 (f + G^T lam).
     """
-    return worst > STALLED * last and (not beyond > 0.0 or off > STALLED * last_off)
+    if not worst > STALLED * last:
+        return False
+    if off > STALLED * last_off:
+        return True
+    for k in range(lam.shape[0]):
+        rounding = MULTIPLIER_ROUNDING * magnitude(W.rows.diagonal[k] * lam[k])
+        if magnitude(W.rows.scratch_1[k]) > rounding:
+            return False
+    return True
 
 
 @formula
@@ -238,8 +246,8 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     worst = 0.0
     last = last_off = 1e300
     for _ in range(refinements):
-        worst, off, beyond = residual_schur(S, W, gamma, x, lam, rhs, semidefinite)
-        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
+        worst, off = residual_schur(S, W, gamma, x, rhs, semidefinite)
+        if not worst > W.options.solve_tolerance or is_stalled(W, lam, worst, last, off, last_off):
             break
         last, last_off = worst, off
         pass_schur(S, W, rhs, x, lam, semidefinite)
@@ -284,8 +292,8 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     if loaded:
         residual_coupled(S, W, f, gamma, x, lam, rhs, loaded)
     for _ in range(refinements):
-        worst, off, beyond = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
+        worst, off = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+        if not worst > W.options.solve_tolerance or is_stalled(W, lam, worst, last, off, last_off):
             break
         last, last_off = worst, off
     return worst
@@ -309,27 +317,21 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
 
 
 @formula
-def residual_schur(S, W, gamma, x, lam, rhs, semidefinite):
+def residual_schur(S, W, gamma, x, rhs, semidefinite):
     """Residuals of both equations after a pass through S; returns what `residual_coupled` does."""
-    worst, off, beyond = row_residual(S, W, gamma, x, lam)
+    worst, off = row_residual(S, W, gamma, x)
     if semidefinite:
         worst = larger(worst, excess_mass_residual(S, W.velocities.scratch_1, rhs, x))
-    return worst, off, beyond
+    return worst, off
 
 
 @formula
-def beyond_rounding(W, k, residual, lam):
-    """Residual of row k, less the rounding error that its multiplier causes in x = M^-1 (f + G^T lam)."""
-    return magnitude(residual) - MULTIPLIER_ROUNDING * magnitude(W.rows.diagonal[k] * lam[k])
-
-
-@formula
-def row_residual(S, W, gamma, x, lam):
+def row_residual(S, W, gamma, x):
     """R = gamma - G x into `W.rows.scratch_1`.
 
-    Returns its largest entry relative to its terms, that entry, and its part beyond rounding.
+    Returns its largest entry relative to its terms, and that entry.
     """
-    off = beyond = 0.0
+    off = 0.0
     size = 1e-300
     for k in range(gamma.shape[0]):
         s = gamma[k]
@@ -340,17 +342,16 @@ def row_residual(S, W, gamma, x, lam):
             a += magnitude(p)
         W.rows.scratch_1[k] = s
         off = larger(off, magnitude(s))
-        beyond = larger(beyond, beyond_rounding(W, k, s, lam))
         size = larger(size, a)
-    return off / size, off, beyond
+    return off / size, off
 
 
 @formula
 def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Residuals of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
-    Returns the largest entry of either relative to its terms, that of gamma - G x, and its part beyond rounding. The
-    residuals of prescribed velocities are the efforts of their drivers: they go to `W.velocities.effort`.
+    Returns the largest entry of either relative to its terms, and that of gamma - G x. The residuals of prescribed
+    velocities are the efforts of their drivers: they go to `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -364,7 +365,7 @@ def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
         if i != j:
             rhs[j] -= W.M[e] * x[i]
     wide = 1e-300
-    off = beyond = 0.0
+    off = 0.0
     for k in range(lam.shape[0]):
         s = gamma[k]
         a = magnitude(s)
@@ -378,7 +379,6 @@ def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
             a += magnitude(p)
         W.rows.scratch_1[k] = s
         off = larger(off, magnitude(s))
-        beyond = larger(beyond, beyond_rounding(W, k, s, lam))
         wide = larger(wide, a)
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
@@ -388,7 +388,7 @@ def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     worst = 0.0
     for d in range(x.shape[0]):
         worst = larger(worst, magnitude(rhs[d]))
-    return larger(worst / size, off / wide), off, beyond
+    return larger(worst / size, off / wide), off
 
 
 @formula

@@ -40,8 +40,8 @@ SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE
     range(15)
 )
 # reserved entries of Work.flat: size of the terms in `DRIFT`; whether the current solve is loaded; inputs of a law;
-# residual of the rows after `REFINE`, and its part beyond rounding
-TERMS, LOADED, LAW_INPUT, LAW_INPUT_RATE, ROW_RESIDUAL, BEYOND_ROUNDING, FIRST_FREE = range(7)
+# residual of the rows after `REFINE`
+TERMS, LOADED, LAW_INPUT, LAW_INPUT_RATE, ROW_RESIDUAL, FIRST_FREE = range(6)
 
 # how the equations are solved: `Sizes.solver`
 SCHUR, COUPLED, ARTICULATED = range(3)
