@@ -18,16 +18,28 @@ from functools import cache, wraps
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from os import PathLike
+    from pathlib import Path
+
     from .assembly.assembled_state import Assembly
+    from .kinematics.prepared import Prepared
     from .model.model import Model
+    from .results.comparison import Comparison
     from .results.equilibrium import Equilibrium
     from .results.equilibrium_series import EquilibriumSeries
+    from .results.inverse_dynamics import InverseDynamics
     from .results.linear_model import LinearModel
     from .results.mechanism_report import MassReport, Report
     from .results.mobility import Mobility
     from .results.modes import Modes, RootLocus
     from .results.result import Result
+    from .results.sensitivity_and_optimum import Optimum, Sensitivity
     from .results.singularities import Branch, Singularities
+    from .results.study import Study
+    from .simulation.integration_options import Stepping
+    from .symbolic.equations import Equations
+    from .symbolic.export.code import Code
 else:
     Model = object  # a mixin of Mechanism; this import is for type checkers only
 
@@ -224,19 +236,6 @@ class MobilityMethods(Model):
         from .singularities.singularities import SingularitiesOptions, singularities
 
         return singularities(self, SingularitiesOptions.asked(locals()))
-
-
-if TYPE_CHECKING:
-    from os import PathLike
-
-    from .kinematics.prepared import Prepared
-    from .model.model import Model
-    from .results.comparison import Comparison
-    from .results.inverse_dynamics import InverseDynamics
-    from .results.result import Result
-    from .simulation.integration_options import Stepping
-else:
-    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 class MotionMethods(Model):
@@ -822,19 +821,6 @@ class StaticsMethods(Model):
         return root_locus(self, RootLocusOptions.asked(locals()))
 
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-    from os import PathLike
-
-    from .model.model import Model
-    from .results.result import Result
-    from .results.sensitivity_and_optimum import Optimum, Sensitivity
-    from .results.study import Study
-    from .simulation.integration_options import Stepping
-else:
-    Model = object  # a mixin of Mechanism; this import is for type checkers only
-
-
 class DesignMethods(Model):
     """Parameter derivatives, optimisation, and studies of many runs."""
 
@@ -1117,16 +1103,6 @@ class DesignMethods(Model):
         from .studies.study import StudyOptions, study
 
         return study(self, StudyOptions.asked(locals()))
-
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from .model.model import Model
-    from .symbolic.equations import Equations
-    from .symbolic.export.code import Code
-else:
-    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 class SymbolicMethods(Model):

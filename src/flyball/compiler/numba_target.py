@@ -313,8 +313,6 @@ def _register_calls(types: Any) -> None:
     from numba.core.errors import TypingError
     from numba.extending import intrinsic
 
-    pass
-
     integer = ir.IntType(64)
 
     @intrinsic
@@ -415,8 +413,6 @@ def _register_code_tables(types: Any) -> None:
     from llvmlite import ir
     from numba.core import cgutils
     from numba.extending import intrinsic
-
-    pass
 
     @intrinsic
     def word(typing, address):  # type: ignore[no-untyped-def]

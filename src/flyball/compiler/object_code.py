@@ -335,8 +335,6 @@ def announce_compilation(kernel: Any) -> Iterator[None]:
     """Announce the compilation of a kernel and its expected duration, from previous ones; record the time."""
     began = time.perf_counter()
     if not _scale:
-        pass
-
         start_compiler()
         _scale.append((time.perf_counter() - began) / NUMBA_IMPORT_SECONDS)
     what, seconds = COSTS.get(kernel.__qualname__, DEFAULT_COST)
@@ -395,8 +393,6 @@ def code_of(kernel: Any) -> LoadedKernel:
             with contextlib.suppress(RuntimeError):  # LLVM's error for code of another machine
                 return _load(code, origin)
     with announce_compilation(kernel):
-        pass
-
         (code,), seconds = compile_timed(kernel, (baseline(),))
     note_compiled(kernel, seconds)
     store_object(kernel, code)
@@ -409,8 +405,6 @@ def is_stored(kernel: Any) -> bool:
 
 
 def _load(code: bytes, origin: str) -> LoadedKernel:
-    pass
-
     made = LoadedCode(code)
     return LoadedKernel(made.address(ENTRY_NAME), made, origin)
 

@@ -192,8 +192,6 @@ class Modes:
 
         Damping is left out, so that the motion is periodic. A mode that does not oscillate is shown going out and back.
         """
-        pass
-
         return mode_motion(self, k, amplitude, outputs)
 
     def to_html(self, path: str | os.PathLike, **options: Any) -> None:
