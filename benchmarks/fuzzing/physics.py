@@ -16,6 +16,7 @@ from .poses import Array, Motion, Z, spatial
 EXACT = 1e-9  # of what is computed twice from the same poses, relative to its terms
 HELD = 1e-6  # gaps relative to the mechanism's size; rates of slip to its fastest point
 BALANCED = 1e-6  # force = mass x acceleration, relative to the largest force or torque
+SOLVED = 1e-11  # of the inertial terms: residual of a solve for accelerations and reactions
 DIGITS = 1e-15  # of the mechanism's size, or a radian: last digits of positions, from which stiff springs make forces
 DRIFT = 3e-6  # energies and momenta over a motion at rtol 1e-9, relative to what moved
 SLOW = 1e-3  # of the size, or of a radian, over the whole motion: no speed that is compared with is less
@@ -205,7 +206,9 @@ def newton_euler(x: Motion) -> Iterator[Finding]:
             want, got = want[:, 2:], out.torque[name][:, 2:]
         else:
             got = out.torque[name]
-        allowed = BALANCED * (np.abs(want).max() + largest * max(1.0, size)) + stiff + 1e-12
+        turning = norms(w).max() ** 2 + norms(al).max()  # about an origin off the mass centre: terms that cancel there
+        cancelled = SOLVED * mass * size**2 * turning
+        allowed = BALANCED * (np.abs(want).max() + largest * max(1.0, size)) + stiff + cancelled + 1e-12
         bad = np.abs(got - want).max()
         if not bad <= allowed:
             yield Finding("Euler's equation", name, float(bad), allowed)
