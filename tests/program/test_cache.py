@@ -4,6 +4,8 @@ Small kernels in processes of their own; what is compiled for a whole motion is 
 """
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -149,3 +151,12 @@ print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for 
     again = occupied.run(script)
     assert (again["misses"], again["inverse"]) == (1, 0.25)
     assert any("cannot be kept" in text and "FLYBALL_CACHE" in text for text in again["told"])
+
+
+def test_compiled_code_is_kept_in_the_home_folder_by_default(tmp_path):
+    """Without ``FLYBALL_CACHE`` it is in the user's cache folder."""
+    without = {k: v for k, v in os.environ.items() if k not in ("FLYBALL_CACHE", "XDG_CACHE_HOME")}
+    code = "from flyball.compiler.object_code import cache_folder; print(cache_folder())"
+    env = without | {"HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path)}
+    found = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    assert Path(found.stdout.strip()).is_relative_to(tmp_path)

@@ -90,7 +90,7 @@ class CompiledCode:
     ) -> None:
         self.function, self.first_order, self.signature = function, first_order, signature
         self._loaded: Any = None
-        update_wrapper(self, function)
+        update_wrapper(self, function)  # type: ignore[arg-type]
 
     @property
     def name(self) -> str:
@@ -195,7 +195,7 @@ class CodeTable:
             if function is None or words[int(first_order)]:
                 continue
             with self._lock:
-                code = FormulaCode(function, first_order, signature)
+                code = FormulaCode(function, first_order, signature)  # type: ignore[arg-type]
                 try:
                     words[int(first_order)] = code.address
                 except (ImportError, MemoryError):
@@ -291,12 +291,12 @@ _byte, _address = ctypes.c_char.from_buffer, ctypes.addressof
 
 def address_of(x: np.ndarray) -> int:
     """Address of an array's first number; through its buffer if possible, which takes a fifth of the time."""
-    return _address(_byte(x)) if x.size and x.flags.writeable and x.flags.c_contiguous else x.ctypes.data
+    return _address(_byte(x)) if x.size and x.flags.writeable and x.flags.c_contiguous else x.ctypes.data  # type: ignore[arg-type]
 
 
 def tuple_layout(fields: Any) -> Struct:
     """Layout of a named tuple: the ``Complex`` variant if an array for which there is one is complex."""
-    return struct_layout(type(fields), _is_complex(fields, struct_layout(type(fields))))
+    return struct_layout(type(fields), _is_complex(fields, struct_layout(type(fields))))  # type: ignore[arg-type]
 
 
 def _is_complex(fields: Any, real_layout: Struct) -> bool:
@@ -388,7 +388,7 @@ def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tup
             f"{name}: an array of {np.dtype(of.dtype)} with {of.ndim} dimensions and without gaps is needed, got "
             f"{x.dtype} with {x.ndim}{'' if x.flags.c_contiguous else ', with gaps'}"
         )
-    place = _address(_byte(x)) if x.size and x.flags.num & _WRITEABLE else x.__array_interface__["data"][0]
+    place = _address(_byte(x)) if x.size and x.flags.num & _WRITEABLE else x.__array_interface__["data"][0]  # type: ignore[arg-type]
     return 0, 0, x.size, x.itemsize, place, *x.shape, *x.strides
 
 
@@ -553,7 +553,7 @@ class Kernel(CompiledCode):
         """Code callable from Python: takes addresses and numbers."""
         kinds = [{int: ctypes.c_int64, float: ctypes.c_double}.get(p, ctypes.c_void_p) for p in self.parameters]
         returned = ctypes.c_double if self.returns is float else ctypes.c_int64
-        return ctypes.CFUNCTYPE(returned, *kinds)(self.address)
+        return ctypes.CFUNCTYPE(returned, *kinds)(self.address)  # type: ignore[arg-type]
 
     def __call__(self, *args: Any) -> Any:
         """Run it on named tuples, arrays and numbers.

@@ -422,11 +422,11 @@ def cache_folder() -> Path | None:
     if given:
         root = Path(given)
     elif sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA", Path.symbol_table())) / "flyball"
+        root = Path(os.environ.get("LOCALAPPDATA", Path.home())) / "flyball"
     elif sys.platform == "darwin":
-        root = Path.symbol_table() / "Library/Caches/flyball"
+        root = Path.home() / "Library/Caches/flyball"
     else:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.symbol_table() / ".cache")) / "flyball"
+        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "flyball"
     try:
         root.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=root):
