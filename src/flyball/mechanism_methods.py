@@ -317,8 +317,8 @@ class MotionMethods(Model):
         specialize : bool or "auto"
             True: use code generated for this mechanism. It is three to five times as fast; generation takes some
             seconds, once for all parameter values, and the code is stored on disk. False: use the general engine. auto:
-            whichever takes less time; existing code is used. The results of both agree within the tolerance, not to the
-            last digit; ``health.engine`` says which was used.
+            whichever takes less time; existing code is used. The results of both are equal to the last bit;
+            ``health.engine`` says which was used.
         step : float or str [s], optional
             Fixed step, without error control; a step ends early at an event, and the next begins there. ``rtol`` is
             then the tolerance of the solution of a step's equations.
