@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switch_kinds import SLIP
+from flyball.constraints.switches.contact_slip import SLIP
 from flyball.simulation.events import event_loop, mode_selection
 
 from .watched_ode import run as watched

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import flyball as fb
-from flyball.constraints.switch_kinds import SLIP
+from flyball.constraints.switches.contact_slip import SLIP
 from flyball.engine.loads import ONSET_LENGTH, ONSET_SPEED, direction_in_space
 from flyball.numerics.complementarity.dense_problem import AT_REST, FRICTION_DISC, FRICTION_DISC_2, UNILATERAL
 from flyball.simulation.events import instant_problem

@@ -34,7 +34,8 @@ LEAF = {"errors", "__version__"}  # may be used anywhere
 LAYERS = (  # from the foundation up: a package imports, when it is imported, only those in lines above its own
     "compiler",
     "math",
-    "numerics constraints rotations collision",
+    "numerics rotations collision",
+    "constraints",
     "model",
     "joints forces controllers elements laws analysis_options progress",
     "tables",
@@ -57,7 +58,7 @@ STANDS_ALONE = {  # these import no more than this of what is below them
     "math": {"compiler"},
     "numerics": {"compiler", "math"},
     "collision": {"compiler", "math"},
-    "constraints": {"compiler", "math"},
+    "constraints": {"compiler", "math", "numerics"},
     "rotations": {"math"},
     "model": {"math", "constraints", "rotations"},
     "joints": {"compiler", "math", "constraints", "model"},
