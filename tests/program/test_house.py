@@ -62,7 +62,7 @@ STANDS_ALONE = {  # these import no more than this of what is below them
     "rotations": {"math"},
     "model": {"math", "constraints", "rotations"},
     "joints": {"compiler", "math", "constraints", "model"},
-    "forces": {"compiler", "math", "constraints", "model"},
+    "forces": {"compiler", "math", "numerics", "constraints", "model"},
     "controllers": {"compiler", "math", "model"},
     "laws": {"compiler", "math", "model"},
     "cli": {"mechanism_methods"},

@@ -162,12 +162,15 @@ class ActiveConstraints:
     signs : dict
         Name -> +1 if it can only push its quantity up, -1 only down, 0 both.
     friction_elements : dict
-        Active friction elements: name -> element.
+        Active friction elements whose limit follows from a law: name -> element.
+    strengths : dict
+        Largest forces of other elements that hold either way up to a limit: name -> number.
     """
 
     parts: list[Element] = field(default_factory=list)
     signs: dict[str, float] = field(default_factory=dict)
     friction_elements: dict[str, Element] = field(default_factory=dict)
+    strengths: dict[str, float] = field(default_factory=dict)
 
 
 def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
@@ -194,8 +197,10 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         if sign is not None:
             out.parts.append(holding_constraint(x.element, x.switch, c.values, value))
             out.signs[x.element.name] = sign
-            if x.switch.kind.forces == INTERVAL:
+            if x.switch.kind.forces == INTERVAL and x.element.acts():
                 out.friction_elements[x.element.name] = x.element
+            elif x.switch.kind.forces == INTERVAL:
+                out.strengths[x.element.name] = float(S.switch_numbers.strength[k])
     return out
 
 
@@ -247,7 +252,8 @@ def support_with_friction(
         result = snapshot(MechanismState.resting(x.c, x.t, x.q, found.lam))
         before, bears = (
             bears,
-            {
+            held.strengths
+            | {
                 k: friction_capacity(model, place.at, e, _joint_reactions(result))
                 for k, e in held.friction_elements.items()
             },

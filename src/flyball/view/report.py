@@ -111,7 +111,7 @@ def holding(result: Result) -> ReportTable:
         if not yes:
             continue
         told = [yes if held[k, i] else no for i in (0, -1)]
-        if result.phases.all[-1].modes.released[k] != 0.0:
+        if result.phases.all[-1].modes.released[k] != 0.0 and not x.switch.kind.permanent:
             told[-1] = "released"
         event = x.element.category == "events"
         name = x.switch.label if event else x.element.name

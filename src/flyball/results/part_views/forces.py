@@ -108,7 +108,7 @@ class ForceView(PartView):
                 held, way = stretches.mode[k] == HELD, stretches.sigma[k]
                 effort = effort + self._result.multipliers[:, s.switches[k].row]
                 side = np.where(held, np.where(way == 0.0, 1.0, way), side)
-        return x, rate, effort, side
+        return x, rate, effort, side + 0.0
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the values of a law over time."""

@@ -221,6 +221,14 @@ def record_mode_changes(
         append_record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
 
 
+def record_initial_breaks(n: InstantProblem) -> None:
+    """Record what cannot hold where the motion starts, and stays open."""
+    for s in n.of(lambda kind: kind.permanent):
+        if n.W.modes.mode[s] == OFF:
+            kind, said = n.kinds[s].opening
+            append_record(n, n.name(s), kind, (said,), None, {}, n.here.y)
+
+
 def _gap_is_open(n: InstantProblem, s: int) -> bool:
     """Return whether the gap of a slip is open: then it does not slide either."""
     return bool(n.W.modes.mode[n.S.switches.other[s]] == OFF)

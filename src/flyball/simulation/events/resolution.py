@@ -39,6 +39,7 @@ from .event_messages import (
     no_admissible_forces,
     no_admissible_impulses,
     passed_bound,
+    record_initial_breaks,
     record_jump,
     record_mode_changes,
     start_beyond_bound,
@@ -216,6 +217,7 @@ def resolve_start(here: EventContext) -> None:
         remove_slight_overlaps(n)
         refuse_violated(n)
         resolve_jumps_and_corners(n, corners, np.zeros(0, np.int64), record=False)
+        record_initial_breaks(n)
     acts.told(["start"])
     _resolve_chain(here, acts.passed())
 
