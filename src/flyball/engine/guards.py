@@ -32,6 +32,7 @@ from ..constraints.switches.guard_kinds import (
     G_HOLDS,
     G_LAW,
     G_LOWER,
+    G_OWN,
     G_PULL,
     G_REVERSES,
     G_SHARED,
@@ -76,16 +77,16 @@ def evaluate_guards(S, W, t, out):
         if kind == G_LAW:
             out[g] = evaluate(S.code, S.const, of, W.stack, (t, 0.0, 0.0), W.sensed)
         else:
-            out[g] = switch_guard(S, W, t, kind, of)
+            out[g] = switch_guard(S, W, t, kind, of, S.guard_code[g])
 
 
-guard = dispatch_by_kind(__name__, "guard", "way, x, rate, force, numbers, units", GUARDS, "nan")
-"""Guard of a switch by its kind."""
+guard = dispatch_by_kind(__name__, "guard", "mode, way, x, rate, force, numbers, units", GUARDS, "nan", 0)
+"""Guard of a switch by its kind, or by the address of the code table of a user's kind."""
 
 
 @formula
-def switch_guard(S, W, t, kind, s):
-    """Value of a guard of switch s."""
+def switch_guard(S, W, t, kind, s, own):
+    """Value of a guard of switch s; ``own`` is the address of the guard of a user's kind."""
     if kind == G_SHARED or (W.modes.shared[s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
         return INACTIVE_GUARD
     way = W.sensed[VALUE, direction_column(S, W, s)]
@@ -96,14 +97,13 @@ def switch_guard(S, W, t, kind, s):
         return way * significant_rate(W.sensed[RATE, m], characteristic_rate(S, m))
     if kind >= G_CONE:
         return contact_guard(S, W, W.sensed, W.rows.multiplier, kind, s)
-    if (kind == G_PULL or kind == G_HOLDS) == (W.modes.mode[s] == OFF):
-        return INACTIVE_GUARD
     force = W.rows.multiplier[k] if k >= 0 else 0.0
-    largest = friction_limit(S, W, t, s) if kind == G_HOLDS else 0.0
+    limited = (kind == G_HOLDS or kind == G_OWN) and W.modes.mode[s] != OFF
+    largest = friction_limit(S, W, t, s) if limited else 0.0
     numbers = (W.modes.lower[s], W.modes.upper[s], S.switch_numbers.stiffness[s], S.switch_numbers.damping[s], largest)
-    return guard(
-        kind, way, W.sensed[VALUE, m], W.sensed[RATE, m], force, numbers, (S.units[m], characteristic_rate(S, m))
-    )
+    units = S.units[m], characteristic_rate(S, m)
+    mode, x, rate = W.modes.mode[s], W.sensed[VALUE, m], W.sensed[RATE, m]
+    return guard(own if kind == G_OWN else kind, mode, way, x, rate, force, numbers, units)
 
 
 @formula

@@ -18,8 +18,10 @@ from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
 from ..constraints.registry import SIGNATURES
 from ..constraints.switches.guard_kinds import (
     G_LAW,
+    G_OWN,
     G_SHARED,
 )
+from ..constraints.switches.guard_kinds import SIGNATURES as SWITCH_SIGNATURES
 from ..constraints.switches.lock import LOCK
 from ..constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW
 from ..model.body import Body, Driver, Frame, Initial
@@ -385,12 +387,18 @@ def fill_switch_tables(s: Structure) -> None:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["forces"].switch[spec.force] = k
         s.guards += [(kind, k, FALLING) for kind in _guards_of(k, spec)]
+        if hasattr(spec.switch.kind, "guard"):
+            s.guards.append((G_OWN, k, FALLING))
     if _may_be_indeterminate(s):
         s.guards.append((G_SHARED, 0, FALLING))
     s.tables["switches"] = integer_table(
         Switches, [(x.row, x.measured, x.switch.kind.forces, x.force, x.law, x.partner, x.other) for x in s.switches]
     )
     s.tables["guards"] = integer_table(Guards, s.guards)
+    s.guard_code = [
+        code_table(type(s.switches[of].switch.kind), SWITCH_SIGNATURES, SWITCH_SIGNATURES) if kind == G_OWN else None
+        for kind, of, _ in s.guards
+    ]
 
 
 def _may_be_indeterminate(s: Structure) -> bool:

@@ -264,6 +264,7 @@ class System(NamedTuple):
     switches: Switches
     switch_numbers: SwitchNumbers
     guards: Guards
+    guard_code: CodeTables1  # (ng,): code table of the guard of a user's kind of switch; 0 of others
     control_laws: Int1  # (nc,): law of the rate of each controller's state, the first of all states; -1: sampled
     kind_terms: Int1  # (TERM_KINDS + 1,): first term of each kind
     sizes: Sizes

@@ -9,9 +9,10 @@
     a closed elastic stop          its force, k d + c ddot
 
 Those of contact points, of corners of laws, of groups of rows and of a user's expressions are in `engine.guards`.
-``GUARDS`` lists the formulas ``guard(way, x, rate, force, numbers, units)``: the direction of the switch, its quantity
-and rate, the multiplier of its row, (lower, upper, stiffness, damping, largest force), and the reference length and
-rate of the quantity. A guard without meaning in the present mode is nan.
+``GUARDS`` lists the formulas ``guard(mode, way, x, rate, force, numbers, units)``: mode and direction of the switch,
+its quantity and rate, the multiplier of its row, (lower, upper, stiffness, damping, largest force), and the reference
+length and rate of the quantity. A guard without meaning in the present mode is nan. A kind of a user's own has a static
+method of this form, ``guard``, which is called by its address.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from __future__ import annotations
 from math import nan
 
 from ...compiler.formulas import formula
+from ...compiler.kernels import Signature
 from ...math.scalar import magnitude
 
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
-G_REVERSES, G_CONE, G_TURNS, G_EDGE, G_SHARED = range(10, 15)
+G_REVERSES, G_OWN, G_CONE, G_TURNS, G_EDGE, G_SHARED = range(10, 16)
 DISTANCE_GUARDS = (G_LOWER, G_UPPER)
 """Distances of open stops and contacts."""
 RATE_GUARDS = (G_SLIDES, G_REVERSES, G_BACK, G_TURNS)
@@ -71,19 +73,19 @@ def stop_distance(x, rate, units):
 
 
 @formula
-def lower_distance(way, x, rate, force, numbers, units):
+def lower_distance(mode, way, x, rate, force, numbers, units):
     """Distance from the lower bound."""
     return stop_distance(x - numbers[0], rate, units)
 
 
 @formula
-def upper_distance(way, x, rate, force, numbers, units):
+def upper_distance(mode, way, x, rate, force, numbers, units):
     """Distance from the upper bound."""
     return stop_distance(numbers[1] - x, -rate, units)
 
 
 @formula
-def slip_rate(way, x, rate, force, numbers, units):
+def slip_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the direction of sliding."""
     if way == BY_RATE:
         return nan
@@ -91,25 +93,25 @@ def slip_rate(way, x, rate, force, numbers, units):
 
 
 @formula
-def reversal_rate(way, x, rate, force, numbers, units):
+def reversal_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the free direction of a ratchet, less the rate at which it counts as reversed."""
     return way * significant_rate(rate, units[1]) + TURN * units[1]
 
 
 @formula
-def overrunning_rate(way, x, rate, force, numbers, units):
+def overrunning_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the free direction."""
     return significant_rate(rate, units[1])
 
 
 @formula
-def pushing_force(way, x, rate, force, numbers, units):
+def pushing_force(mode, way, x, rate, force, numbers, units):
     """Force in the direction in which the row can push."""
     return way * force
 
 
 @formula
-def holding_margin(way, x, rate, force, numbers, units):
+def holding_margin(mode, way, x, rate, force, numbers, units):
     """Largest force less the present one."""
     return numbers[4] - magnitude(force)
 
@@ -133,13 +135,13 @@ def pressed_side(side, bound, way, x, rate, numbers, units):
 
 
 @formula
-def pressed_lower(way, x, rate, force, numbers, units):
+def pressed_lower(mode, way, x, rate, force, numbers, units):
     """Guard of the lower side of an elastic stop."""
     return pressed_side(1.0, numbers[0], way, x, rate, numbers, units)
 
 
 @formula
-def pressed_upper(way, x, rate, force, numbers, units):
+def pressed_upper(mode, way, x, rate, force, numbers, units):
     """Guard of the upper side of an elastic stop."""
     return pressed_side(-1.0, numbers[1], way, x, rate, numbers, units)
 
@@ -149,3 +151,5 @@ GUARDS = {
     G_SLIDES: slip_rate, G_REVERSES: reversal_rate, G_BACK: overrunning_rate, G_PRESS_LOWER: pressed_lower,
     G_PRESS_UPPER: pressed_upper,
 }  # fmt: skip
+SIGNATURES = (Signature("guard", "mode, way, x, rate, force, numbers, units", (0, 0, 0, 0, 0, 5, 2), 0, "a number"),)
+"""The guard of a kind of a user's own."""
