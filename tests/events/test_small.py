@@ -101,7 +101,7 @@ def test_a_slip_that_begins_backwards_is_seen(monkeypatch, often):
 
     def backwards(n, parts, found):
         write(n, parts, found)
-        ways, slips = n.ways(), n.of(SLIP)
+        ways, slips = n.ways(), n.of(lambda kind: kind is SLIP)
         if len(count) < often and ways[slips].any():
             count.append(n.here.t)
             ways[slips] *= -1.0

@@ -75,19 +75,23 @@ def stop_distance(x, rate, units):
 @formula
 def lower_distance(mode, way, x, rate, force, numbers, units):
     """Distance from the lower bound."""
+    if mode != OFF:
+        return nan
     return stop_distance(x - numbers[0], rate, units)
 
 
 @formula
 def upper_distance(mode, way, x, rate, force, numbers, units):
     """Distance from the upper bound."""
+    if mode != OFF:
+        return nan
     return stop_distance(numbers[1] - x, -rate, units)
 
 
 @formula
 def slip_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the direction of sliding."""
-    if way == BY_RATE:
+    if mode != OFF or way == BY_RATE:
         return nan
     return way * significant_rate(rate, units[1])
 
@@ -95,24 +99,32 @@ def slip_rate(mode, way, x, rate, force, numbers, units):
 @formula
 def reversal_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the free direction of a ratchet, less the rate at which it counts as reversed."""
+    if mode != OFF:
+        return nan
     return way * significant_rate(rate, units[1]) + TURN * units[1]
 
 
 @formula
 def overrunning_rate(mode, way, x, rate, force, numbers, units):
     """Rate in the free direction."""
+    if mode != OFF:
+        return nan
     return significant_rate(rate, units[1])
 
 
 @formula
 def pushing_force(mode, way, x, rate, force, numbers, units):
     """Force in the direction in which the row can push."""
+    if mode == OFF:
+        return nan
     return way * force
 
 
 @formula
 def holding_margin(mode, way, x, rate, force, numbers, units):
     """Largest force less the present one."""
+    if mode == OFF:
+        return nan
     return numbers[4] - magnitude(force)
 
 
