@@ -10,7 +10,8 @@ Describe a mechanism
     contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane or HeightField as a
                   floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
                   moving surfaces
-    limits        Limit stops a coordinate, Backlash is play between some, OneWay a freewheel, Ratchet holds at teeth;
+    limits        Limit stops a coordinate, Backlash is play between some, OneWay a freewheel, Ratchet holds at teeth,
+                  ShearPin breaks;
                   rigid or elastic, as Rope is; Detent (a force) has notches
     Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,

@@ -4,8 +4,9 @@ A force is a class decorated with `element` that derives from one of the base cl
 ``wrench(par, F, M, laws, values)`` of a `BodyForce`, `TwoPointForce` or `TwoFrameForce`, ``effort(par, x, rate, laws,
 load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and lists its `blocks`: constraint rows of
 flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. A shape derives from `ConvexSolid` and has a support
-function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` contain the functions that formulas may use.
-``flyball.testing`` tests an element. `runge_kutta` defines a method of integration.
+function ``support(par, d)``. An element that switches returns a `Switch` from `switches`; its kind is one of
+`constraints.switches` or a `SwitchKind` of its own. `flyball.math.vec` and `flyball.math.scalar` contain the functions
+that formulas may use. ``flyball.testing`` tests an element. `runge_kutta` defines a method of integration.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from .constraints import blocks as blocks
 from .constraints.blocks import ConstraintRow as ConstraintRow
 from .constraints.displacement import point_row as point_row
 from .constraints.displacement import seen_from as seen_from
+from .constraints.switches.switch_kind import ProblemRow as ProblemRow
+from .constraints.switches.switch_kind import SwitchKind as SwitchKind
 from .model.element import Angle as Angle
 from .model.element import Damping as Damping
 from .model.element import Direction as Direction
@@ -40,8 +43,10 @@ from .model.element import positive as positive
 from .model.force import BodyForce as BodyForce
 from .model.force import CoordinateForce as CoordinateForce
 from .model.force import JointForce as JointForce
+from .model.force import Switch as Switch
 from .model.force import TwoFrameForce as TwoFrameForce
 from .model.force import TwoPointForce as TwoPointForce
+from .model.force import Unilateral as Unilateral
 from .model.joint import Coordinate as Coordinate
 from .model.joint import Joint as Joint
 from .model.shapes import ConvexSolid as ConvexSolid

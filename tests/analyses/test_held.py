@@ -27,6 +27,8 @@ HOLDERS = {
     "limit": fb.Limit("hold", "A.angle", lower=0.0),
     "one way": fb.OneWay("hold", "A.angle"),
     "ratchet": fb.Ratchet("hold", "A.angle", teeth=12),
+    "ratchet with a tooth elsewhere": fb.Ratchet("hold", "A.angle", pitch=0.1, tooth=0.1),
+    "shear pin": fb.ShearPin("hold", "A.angle", strength=2 * WEIGHT),
     "rope": fb.Rope("hold", bodies=("ground", "a"), at=((1, 1), (1, 0))),
 }
 
@@ -57,6 +59,17 @@ def test_a_brake_that_is_too_weak_holds_nothing():
     m = double(fb.Brake("hold", "A.angle", capacity=0.9 * WEIGHT))
     with pytest.raises(fb.AnalysisError, match="does not rest there"):
         m.modes()
+
+
+def test_a_pin_that_is_too_weak_holds_nothing():
+    m = double(fb.ShearPin("hold", "A.angle", strength=0.9 * WEIGHT))
+    with pytest.raises(fb.AnalysisError, match="does not rest there"):
+        m.modes()
+
+
+def test_a_pin_tells_how_much_of_its_strength_is_used():
+    touch = double(fb.ShearPin("hold", "A.angle", strength=2 * WEIGHT)).equilibrium().touching[0]
+    assert touch.used == pytest.approx(0.5, rel=1e-9)
 
 
 def test_what_is_at_its_limit_has_no_linear_equations():

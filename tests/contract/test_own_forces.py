@@ -326,6 +326,7 @@ SHOWN = {
     "Sheet": None,
     "OnEllipse": lambda run: abs(run["bead.x"][-1] ** 2 / 4 + run["bead.y"][-1] ** 2 - 1.0) < 1e-9,
     "Lens": lambda run: abs(run["lens.z"] - 0.5).max() < 2e-3 and abs(run["lens"].quaternion[:, 2]).max() < 0.04,
+    "Catch": lambda run: [(x.kind, round(x.t, 9)) for x in run.events] == [("impact", 2.0), ("escape", 3.5)],
     "runge_kutta": lambda run: run.energy.drift < 1e-3,
 }
 

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 import pytest
 
-from flyball.constraints.switch_kinds import LOCK
+from flyball.constraints.switches.lock import LOCK
+from flyball.constraints.switches.switch_kind import SwitchKind
 from flyball.model.element import Element, element
 from flyball.model.force import Switch
 
@@ -18,7 +19,7 @@ class Row(Element):
     """A row with a mode, of the test's."""
 
     of: tuple[str, ...]
-    kind: int = LOCK
+    kind: SwitchKind = LOCK
     par: tuple[float, ...] = ()
     weights: tuple[float, ...] = (1.0,)
     category: ClassVar[str] = "limits"

@@ -7,12 +7,13 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.constraints.switches.guard_kinds import HELD, OFF
 from flyball.engine.entry_point import MOTION
 from flyball.engine.loads import SLOPES_UNKNOWN
 from flyball.model.contact_point import Touch
 from flyball.simulation.initial_state import find_initial_state
 from flyball.simulation.method_choice import unsupported_contacts, with_contact_points
-from flyball.tables.table_definitions import HELD, OFF, VALUE
+from flyball.tables.table_definitions import VALUE
 
 G, MU = 9.81, 0.3
 BALL = fb.Sphere(radius=0.1)

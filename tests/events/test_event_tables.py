@@ -7,12 +7,13 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import compile_mechanism
-from flyball.constraints.switch_kinds import LOCK
+from flyball.constraints.switches.guard_kinds import G_LAW, HELD
+from flyball.constraints.switches.lock import LOCK
 from flyball.engine.entry_point import MOTION
 from flyball.engine.guards import evaluate_guards
 from flyball.tables.constraint_rows import joint_row_name, released_joints
 from flyball.tables.coordinate_choice import spanning_joints
-from flyball.tables.table_definitions import EITHER, FALLING, G_LAW, HELD, RISING, VALUE
+from flyball.tables.table_definitions import EITHER, FALLING, RISING, VALUE
 
 
 def model(planar: bool = True) -> fb.Mechanism:

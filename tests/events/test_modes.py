@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switch_kinds import ONE_WAY, STOP
+from flyball.constraints.switches.guard_kinds import HELD, OFF
+from flyball.constraints.switches.latches import ONE_WAY
+from flyball.constraints.switches.stop import STOP
 from flyball.engine.entry_point import MOTION
 from flyball.simulation.events.resolution import resolve_start
-from flyball.tables.table_definitions import HELD, OFF
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import modes, standing
 

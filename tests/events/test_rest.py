@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import flyball as fb
+from flyball.constraints.switches.stop import STOP
 from tests.events.one_row import BOTH, Row, forgotten, rows
 
 G = 9.81
@@ -18,7 +19,7 @@ def ball(e, height=1.0):
     m = fb.Mechanism("ball", planar=True, gravity=(0, -G))
     m.add(fb.Body("ball", mass=2.0, inertia=0.1, position=(0, height)))
     m.add(fb.Prismatic("P", "ground", "ball", at=(0, height), axis=(0, 1)))
-    return rows(m, Row("floor", of=("P.displacement",), kind=0, par=(-height, np.inf, e)))
+    return rows(m, Row("floor", of=("P.displacement",), kind=STOP, par=(-height, np.inf, e)))
 
 
 @BOTH
@@ -54,7 +55,7 @@ def rocking(height, width, tilt):
     m.add(fb.Body("block", mass=3.0, inertia=3.0 * (height**2 + width**2) / 12, position=middle, angle=-tilt))
     for name, side in (("left", -1.0), ("right", 1.0)):
         m.add(fb.Frame(name, body="block", position=(side * width / 2, -height / 2)))
-        rows(m, Row(f"{name}_stop", of=(f"{name}.y",), kind=0, par=(0.0, np.inf, 0.0)))
+        rows(m, Row(f"{name}_stop", of=(f"{name}.y",), kind=STOP, par=(0.0, np.inf, 0.0)))
     return m
 
 

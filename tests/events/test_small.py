@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switch_kinds import SLIP
+from flyball.constraints.switches.contact_slip import SLIP
 from flyball.simulation.events import event_loop, mode_selection
 
 from .watched_ode import run as watched
@@ -101,7 +101,7 @@ def test_a_slip_that_begins_backwards_is_seen(monkeypatch, often):
 
     def backwards(n, parts, found):
         write(n, parts, found)
-        ways, slips = n.ways(), n.of(SLIP)
+        ways, slips = n.ways(), n.of(lambda kind: kind is SLIP)
         if len(count) < often and ways[slips].any():
             count.append(n.here.t)
             ways[slips] *= -1.0

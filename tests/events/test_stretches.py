@@ -10,7 +10,8 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import CompiledMechanism
-from flyball.constraints.switch_kinds import LOCK
+from flyball.constraints.switches.guard_kinds import HELD
+from flyball.constraints.switches.lock import LOCK
 from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
 from flyball.model.force import Switch
@@ -19,7 +20,6 @@ from flyball.results.result import Result
 from flyball.simulation.diagnosis import acceleration_violation
 from flyball.simulation.events.event_loop import PhaseRecorder
 from flyball.simulation.initial_state import find_initial_state
-from flyball.tables.table_definitions import HELD
 
 
 @element

@@ -10,12 +10,15 @@ import pytest
 import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.assembly.compiled_mechanism import compile_mechanism
-from flyball.constraints.switch_kinds import LOCK, STOP
+from flyball.constraints.switches.guard_kinds import HELD, OFF, STEADY
+from flyball.constraints.switches.lock import LOCK
+from flyball.constraints.switches.stop import STOP
+from flyball.constraints.switches.switch_kind import SwitchKind
 from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
 from flyball.model.force import Switch
 from flyball.simulation.initial_state import find_initial_state
-from flyball.tables.table_definitions import HELD, OFF, STEADY, VALUE
+from flyball.tables.table_definitions import VALUE
 from tests.mechanisms import four_bar
 
 
@@ -24,7 +27,7 @@ class Hold(Element):
     """A coordinate of the test's that is held."""
 
     of: tuple[str, ...]
-    kind: int = LOCK
+    kind: SwitchKind = LOCK
     category: ClassVar[str] = "limits"
 
     def switches(self):

@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import flyball as fb
-from flyball.constraints.switch_kinds import SLIP
+from flyball.constraints.switches.contact_slip import SLIP
+from flyball.constraints.switches.stop import STOP
 from flyball.engine.loads import ONSET_LENGTH, ONSET_SPEED, direction_in_space
 from flyball.numerics.complementarity.dense_problem import AT_REST, FRICTION_DISC, FRICTION_DISC_2, UNILATERAL
 from flyball.simulation.events import instant_problem
@@ -318,10 +319,10 @@ def test_a_slip_begins_that_is_slow_and_gets_faster(speed, faster, begins):
 def test_a_slip_is_let_go_with_the_friction_that_it_held():
     """At the edge of its cone: 3 N of 0.3 times 10 N."""
     x, mu = np.array([10.0, 1.8, -2.4]), 0.3
-    numbers = SwitchNumbers(*np.zeros((9, 3)))
+    numbers = SwitchNumbers(*np.zeros((10, 3)))
     numbers.kinetic_friction[1:] = mu
     S = SimpleNamespace(switch_numbers=numbers)
-    n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kind=[0, SLIP, SLIP], S=S)
+    n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kinds=[STOP, SLIP, SLIP], S=S)
     parts = [
         ProblemRow(0, UNILATERAL),
         ProblemRow(1, FRICTION_DISC, gain=mu, of=0),

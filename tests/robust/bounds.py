@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.constraints.switch_kinds import ONE_WAY, RATCHET, STOP
+from flyball.constraints.switches.latches import ONE_WAY, RATCHET
+from flyball.constraints.switches.stop import STOP
 from flyball.model.contact_point import Touch
 from flyball.results.result import Result
 

@@ -103,7 +103,9 @@ def _structure(s: Structure, S: System) -> bytes:
     """Hash of everything that parameters cannot change, of sources and processor."""
     digest = hashlib.sha256(target_description().encode() + sources_digest())
     digest.update(" ".join("" if x is None else x.content for x in (*s.force_code, *s.term_code)).encode())
-    for name, a in named_arrays(S._replace(force_code=S.force_code != 0, term_code=S.term_code != 0)):
+    for name, a in named_arrays(
+        S._replace(force_code=S.force_code != 0, term_code=S.term_code != 0, guard_code=S.guard_code != 0)
+    ):
         number = name.partition(".")[0] in TRACED_TABLES
         digest.update(f"{name} {a.shape} {a.dtype}".encode() + (b"" if number else np.ascontiguousarray(a).tobytes()))
     digest.update(f"{s.nq} {s.nv} {len(s.states)} {s.depth} {len(s.measured)} {len(s.loads)}".encode())

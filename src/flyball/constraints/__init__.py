@@ -5,7 +5,7 @@ the force on M, the torques on M and on F, and the acceleration bias; the revers
 derives the Jacobian, reactions and acceleration terms from it in any coordinates. Bias accelerations of the records
 vanish in absolute coordinates and not in joint coordinates: test a row in both.
 
-`blocks` groups rows (`Row`) for joints, after Hahn's building blocks BB1 to BB5. `switch_kinds` numbers the kinds of
-rows that hold at times. Imports NumPy, `compiler` and `math` only. A new kind is a file with ``KIND``, the next
-number, and ``row``; `registry` lists what else it may declare.
+`blocks` groups rows (`Row`) for joints, after Hahn's building blocks BB1 to BB5. `switches` are the kinds of
+rows that are active at times. Imports NumPy, `compiler`, `math` and `numerics` only. A new kind is a file with
+``KIND``, the next number, and ``row``; `registry` lists what else it may declare.
 """

@@ -3,14 +3,8 @@
 A guard is a number whose zero crossing is an event:
 
     a user's event expression      its value
-    an open stop                   x - lower, upper - x
-    a closed stop, a latch         direction * lam: positive while it pushes
-    sticking friction              static limit - |lam|
-    sliding friction               direction * rate
-    an overrunning freewheel       rate
+    a switch                       a formula of `constraints.switches.guard_kinds`
     a nonsmooth point of a law     direction * u; while the motion is held on u = 0: 1 - |direction|
-    an open elastic stop           -d, the distance, or past it -(d + c ddot / k) where that is more
-    a closed elastic stop          its force, k d + c ddot
     a contact point                see `contact_guard`
 
 A guard without meaning in the present mode is nan. Modes and directions are in `Work` and change between steps only.
@@ -28,10 +22,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.formulas import call, formula
+from ..compiler.formulas import call, dispatch_by_kind, formula
 from ..compiler.kernels import kernel
 from ..compiler.struct_layout import Float1, Float2, Int1
-from ..constraints.switch_kinds import BY_RATE, FRICTION, FROZEN, RATCHET, SLIP, STATIC, TURN
+from ..constraints.switches.guard_kinds import (
+    G_BACK,
+    G_CONE,
+    G_CORNER,
+    G_HOLDS,
+    G_LAW,
+    G_LOWER,
+    G_OWN,
+    G_PULL,
+    G_REVERSES,
+    G_SHARED,
+    G_SLIDES,
+    G_TURNS,
+    G_UPPER,
+    GUARDS,
+    OFF,
+    POSITION_ROUNDING,
+    STATIC,
+    significant_rate,
+)
+from ..constraints.switches.switch_kind import DISC, INTERVAL
 from ..laws.bytecode import BY_TIME, SENSOR, evaluate, evaluate_jet
 from ..math.scalar import magnitude, sqrt
 from ..numerics.complementarity.interior_point import (
@@ -44,49 +58,14 @@ from ..numerics.complementarity.interior_point import (
 from ..numerics.event_location.guards import GuardState
 from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.time_loop import StepState
-from ..tables.table_definitions import (
-    G_BACK,
-    G_CONE,
-    G_CORNER,
-    G_HOLDS,
-    G_LAW,
-    G_LOWER,
-    G_PRESS_LOWER,
-    G_PRESS_UPPER,
-    G_PULL,
-    G_SHARED,
-    G_SLIDES,
-    G_TURNS,
-    G_UPPER,
-    OFF,
-    RATE,
-    RETURNED,
-    VALUE,
-    System,
-    Work,
-)
+from ..tables.table_definitions import RATE, RETURNED, VALUE, System, Work
 from .calls import SOLVE, OutputBuffer
 from .element_dispatch import effort, force_kind
 from .loads import contact_guard, force_law, force_row, is_sliding, loads_end
 from .rows import characteristic_rate, controller_column, count_measured, direction_column, largest_measured_rate
 
 INACTIVE_GUARD = float("nan")
-POSITION_ROUNDING = 2e-15  # relative to the mechanism's length, or a radian: a smaller distance counts as zero
 RELATIVE_ROUNDING = 1e-13  # relative to the fastest rate, or the largest force: rounding error of another rate or force
-KINEMATIC_GUARDS = (G_LOWER, G_UPPER, G_SLIDES, G_BACK, G_TURNS)  # guards of positions and rates
-MODE_GUARDS = (
-    G_LOWER,
-    G_UPPER,
-    G_PULL,
-    G_HOLDS,
-    G_SLIDES,
-    G_BACK,
-    G_CONE,
-    G_SHARED,
-)  # guards that are positive as long as the modes are right
-GRAZING_DEPTH = 1e-12  # depth at which an undecided elastic stop counts as closed, in mechanism lengths or radians
-RESTING_RATE = 1e-9  # times the characteristic rate of a quantity: a slower approach counts as none
-CREEP_RATE = 1e-13  # times the characteristic rate of a quantity: a smaller rate counts as zero
 WRONG_SIDE = 1e-9  # relative to the terms of a corner function: beyond this the law is on the other side
 
 
@@ -98,63 +77,33 @@ def evaluate_guards(S, W, t, out):
         if kind == G_LAW:
             out[g] = evaluate(S.code, S.const, of, W.stack, (t, 0.0, 0.0), W.sensed)
         else:
-            out[g] = switch_guard(S, W, t, kind, of)
+            out[g] = switch_guard(S, W, t, kind, of, S.guard_code[g])
+
+
+guard = dispatch_by_kind(__name__, "guard", "mode, way, x, rate, force, numbers, units", GUARDS, "nan", 0)
+"""Guard of a switch by its kind, or by the address of the code table of a user's kind."""
 
 
 @formula
-def switch_guard(S, W, t, kind, s):
-    """Value of a guard of switch s."""
+def switch_guard(S, W, t, kind, s, own):
+    """Value of a guard of switch s; ``own`` is the address of the guard of a user's kind."""
     if kind == G_SHARED or (W.modes.shared[s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
         return INACTIVE_GUARD
     way = W.sensed[VALUE, direction_column(S, W, s)]
     if kind == G_CORNER:
         return way * corner_value(S, W, t, s) if W.modes.mode[s] == OFF else 1.0 - magnitude(way)
-    if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
-        return pressed_guard(S, W, s, kind, way - FROZEN)
+    m, k = S.switches.measured[s], S.switches.row[s]
     if kind == G_TURNS and S.switches.partner[s] < 0 and is_sliding(S, W, s):
-        m = S.switches.measured[s]
-        return way * significant_rate(S, m, W.sensed[RATE, m])
+        return way * significant_rate(W.sensed[RATE, m], characteristic_rate(S, m))
     if kind >= G_CONE:
         return contact_guard(S, W, W.sensed, W.rows.multiplier, kind, s)
-    m, k = S.switches.measured[s], S.switches.row[s]
-    x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
-    if W.modes.mode[s] == OFF:
-        if kind == G_LOWER:
-            return stop_distance(S, m, x - W.modes.lower[s], rate)
-        if kind == G_UPPER:
-            return stop_distance(S, m, W.modes.upper[s] - x, -rate)
-        if kind == G_SLIDES:
-            if way == BY_RATE:
-                return INACTIVE_GUARD
-            late = TURN * characteristic_rate(S, m) if S.switches.kind[s] == RATCHET else 0.0
-            return way * significant_rate(S, m, rate) + late
-        if kind == G_BACK:
-            return significant_rate(S, m, rate)
-        return INACTIVE_GUARD
-    if kind == G_PULL:
-        return way * W.rows.multiplier[k]
-    if kind == G_HOLDS:
-        return friction_limit(S, W, t, S.switches.force[s]) - magnitude(W.rows.multiplier[k])
-    return INACTIVE_GUARD
-
-
-@formula
-def significant_rate(S, m, rate):
-    """Rate of quantity m, or 0 where it is only rounding.
-
-    That is so for a quantity that does not move or is held by constraints.
-    """
-    return 0.0 if magnitude(rate) <= CREEP_RATE * characteristic_rate(S, m) else rate
-
-
-@formula
-def stop_distance(S, m, x, rate):
-    """Distance of quantity m from a stop, or 0 where it is only rounding, as at separation with zero speed."""
-    return (
-        0.0
-        if magnitude(x) <= POSITION_ROUNDING * S.units[m] and rate >= -RESTING_RATE * characteristic_rate(S, m)
-        else x
-    )
+    force = W.rows.multiplier[k] if k >= 0 else 0.0
+    limited = (kind == G_HOLDS or kind == G_OWN) and W.modes.mode[s] != OFF
+    largest = friction_limit(S, W, t, s) if limited else 0.0
+    numbers = (W.modes.lower[s], W.modes.upper[s], S.switch_numbers.stiffness[s], S.switch_numbers.damping[s], largest)
+    units = S.units[m], characteristic_rate(S, m)
+    mode, x, rate = W.modes.mode[s], W.sensed[VALUE, m], W.sensed[RATE, m]
+    return guard(own if kind == G_OWN else kind, mode, way, x, rate, force, numbers, units)
 
 
 @formula
@@ -173,7 +122,9 @@ def guard_rounding(S, W, t, trial, so_far, out):
         if kind == G_LOWER or kind == G_UPPER:
             m = S.switches.measured[of]
             out[g] = POSITION_ROUNDING * max(S.units[m], magnitude(W.sensed[VALUE, m]))
-        elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0):
+        elif (
+            kind == G_SLIDES or kind == G_REVERSES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0)
+        ):
             out[g] = max(
                 RELATIVE_ROUNDING * fastest, POSITION_ROUNDING * characteristic_rate(S, S.switches.measured[of])
             )
@@ -260,27 +211,11 @@ def corner_terms(S, W, t, s, fastest):
 
 
 @formula
-def pressed_guard(S, W, s, kind, direction):
-    """Guard of an elastic stop: the force on a closed side, the distance on an open side."""
-    m, side = S.switches.measured[s], 1.0 if kind == G_PRESS_LOWER else -1.0
-    bound = W.modes.lower[s] if kind == G_PRESS_LOWER else W.modes.upper[s]
-    depth = side * (bound - W.sensed[VALUE, m])
-    push = S.switch_numbers.stiffness[s] * depth - S.switch_numbers.damping[s] * side * W.sensed[RATE, m]
-    told = direction > -1.5  # interpolated values are not exact; a side that has to decide for itself is far below
-    if told and direction * side > 0.5:
-        return push
-    if told and direction * side < -0.5:
-        return INACTIVE_GUARD
-    if not told:  # at the side, with nothing that determines where it goes
-        return GRAZING_DEPTH * S.units[m] - depth
-    # where it separates faster than the force decays it is open: continuous at separation, so that no other event there
-    # is mistaken for a zero
-    return max(-depth, -push / S.switch_numbers.stiffness[s])
-
-
-@formula
-def friction_limit(S, W, t, k):
-    """Largest force that friction k can hold at rest, from its own law."""
+def friction_limit(S, W, t, s):
+    """Largest force that switch s can hold: from the law of its friction at rest, or its own number."""
+    k = S.switches.force[s]
+    if k < 0:
+        return S.switch_numbers.strength[s]
     x = W.sensed[VALUE, S.forces.F[k]]
     load = W.sensed[RETURNED, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     laws = (force_law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
@@ -325,14 +260,14 @@ def empty_distribution(ns: int, nr: int) -> ForceDistribution:
 @formula
 def fill_cell(S, W, t, G, s, c):
     """Write the bounds of switch s to cell c. Returns whether it has bounds."""
-    D, k, kind = G.Q.D, G.Q.count[UNKNOWN_COUNT], S.switches.kind[s]
-    row, other = S.switches.row[s], S.switches.partner[s] if kind == SLIP else -1
+    D, k, kind = G.Q.D, G.Q.count[UNKNOWN_COUNT], S.switches.forces[s]
+    row, other = S.switches.row[s], S.switches.partner[s]
     if -1 < other < s:
         return False
     for i in range(3):
         for j in range(k + 1):
             D[c, i, j] = 0.0
-    if kind == SLIP:
+    if kind == DISC:
         mu, gap = S.switch_numbers.static_friction[s], S.switches.row[S.switches.other[s]]
         D[c, 0, 0], D[c, 1, 0] = mu * W.rows.multiplier[gap], W.rows.multiplier[row]
         for j in range(k):
@@ -342,8 +277,8 @@ def fill_cell(S, W, t, G, s, c):
             D[c, 2, 0] = W.rows.multiplier[along]
             for j in range(k):
                 D[c, 2, 1 + j] = G.null[j, along]
-    elif kind == FRICTION:
-        D[c, 0, 0], D[c, 1, 0] = friction_limit(S, W, t, S.switches.force[s]), W.rows.multiplier[row]
+    elif kind == INTERVAL:
+        D[c, 0, 0], D[c, 1, 0] = friction_limit(S, W, t, s), W.rows.multiplier[row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = G.bend[j, s], G.null[j, row]
     else:

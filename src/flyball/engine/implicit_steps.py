@@ -13,6 +13,7 @@ import numpy as np
 from ..compiler.formulas import call, formula
 from ..compiler.kernels import kernel
 from ..compiler.struct_layout import Float1, Int1, Int2
+from ..constraints.switches.guard_kinds import STEADY
 from ..math.rotation import cayley_rate
 from ..numerics.integrators.implicit_method import restore_start_rates, run_implicit_task
 from ..numerics.integrators.implicit_workspace import STEP_START, RadauStepWorkspace
@@ -20,7 +21,7 @@ from ..numerics.integrators.radau import accept_radau_step as enter_radau
 from ..numerics.integrators.radau import attempt_radau_step, reject_radau_step
 from ..numerics.integrators.radau_stages import interpolate_radau as between_radau
 from ..numerics.integrators.time_loop import BEGIN_SEGMENT, CURRENT, SAVED
-from ..tables.table_definitions import STEADY, VALUE, ComplexSystem, ComplexWork, System, Work
+from ..tables.table_definitions import VALUE, ComplexSystem, ComplexWork, System, Work
 from .calls import (
     GUARD_VALUES,
     INERTIAL_TERMS,

@@ -19,6 +19,7 @@ import numpy as np
 from ..compiler.formulas import formula
 from ..compiler.kernels import ArrayBuffer, BoundKernel, JoinedBuffer, PooledBuffer, StructBuffer, StructPool, kernel
 from ..compiler.struct_layout import Array, Float2, Int1
+from ..constraints.switches.guard_kinds import DISTANCE_GUARDS, FORCE_GUARDS, G_BACK, G_SHARED, G_TURNS, RATE_GUARDS
 from ..numerics.complementarity.interior_point import UNKNOWN_COUNT
 from ..numerics.event_location.event_steps import finish_step_with_events, start_event_segment
 from ..numerics.event_location.guards import (
@@ -42,7 +43,7 @@ from ..numerics.integrators.time_loop import (
     no_segment_start,
 )
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import BIAS, G_BACK, G_SHARED, G_TURNS, RATE, RETURNED, VALUE, System, Work
+from ..tables.table_definitions import BIAS, RATE, RETURNED, VALUE, System, Work
 from .calls import (
     ENGINE,
     GROUP,
@@ -65,8 +66,6 @@ from .calls import (
 from .entry_point import engine, struct_tables
 from .guards import (
     GROUP_ROUNDING,
-    KINEMATIC_GUARDS,
-    MODE_GUARDS,
     ForceDistribution,
     call_group_guard,
     corner_tolerances,
@@ -371,9 +370,9 @@ def guard_classes(S: System) -> np.ndarray:
     """
     kinds, of = S.guards.kind, S.guards.of
     slips = np.flatnonzero(kinds == G_TURNS)
-    kept = np.isin(kinds, MODE_GUARDS)
+    kept = np.isin(kinds, (*DISTANCE_GUARDS, *RATE_GUARDS, *FORCE_GUARDS, G_SHARED)) & (kinds != G_TURNS)
     kept[slips[S.switches.partner[of[slips]] < 0]] = True
-    return np.where(kept, np.where(np.isin(kinds, KINEMATIC_GUARDS), 2, 1), 0)
+    return np.where(kept, np.where(np.isin(kinds, (*DISTANCE_GUARDS, *RATE_GUARDS)), 2, 1), 0)
 
 
 def _event_workspace(S: System, expected: Work, c: np.ndarray, stages: int) -> GuardState:

@@ -18,11 +18,11 @@ halved, so that no step leads to another branch. Rows are written at all step ti
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from ..constraints.switch_kinds import BRANCH
+from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import STACK_RESERVE, evaluate_jet, is_entire
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..numerics.integrators.time_loop import DONE, RUNNING, STEP_FAILED, TOO_MANY_STEPS
-from ..tables.table_definitions import BIAS, FINISH, LOADS, OFF, RATE, REVOLUTE, SCHUR, STEADY, VALUE
+from ..tables.table_definitions import BIAS, FINISH, LOADS, RATE, REVOLUTE, SCHUR, VALUE
 from .calls import call_generated
 from .element_dispatch import progress, remember
 from .kinematics import coordinate_rates, retract
@@ -70,7 +70,7 @@ FLAT_CHANGE = 1e-9
 @formula
 def held_on_corner(S, W, s):
     """Whether the motion is held on the corner of switch s."""
-    return S.switches.kind[s] == BRANCH and W.modes.mode[s] != OFF
+    return S.switches.law[s] >= 0 and W.modes.mode[s] != OFF
 
 
 @formula
@@ -101,8 +101,8 @@ def corner_rates(S, W, t):
             evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, ALONG_MOTION)[1] if law >= 0 else 0.0
         )
     for s in range(S.switches.row.shape[0]):
-        if S.switches.kind[s] == BRANCH:
-            law = S.switches.law[s]
+        law = S.switches.law[s]
+        if law >= 0:
             jet = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, ALONG_MOTION)
             W.modes.drift[s] = jet[2] if W.modes.mode[s] == STEADY else jet[1]
     for m in range(nm):

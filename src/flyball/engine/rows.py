@@ -16,10 +16,11 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..constraints.registry import BY_ADDRESS
+from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub
-from ..tables.table_definitions import BIAS, OFF, RATE, STEADY, VALUE
+from ..tables.table_definitions import BIAS, RATE, VALUE
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7

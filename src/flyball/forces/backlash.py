@@ -6,7 +6,8 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from ..constraints.switch_kinds import ELASTIC, STOP
+from ..constraints.switches.elastic_stop import ELASTIC
+from ..constraints.switches.stop import STOP
 from ..errors import ModelError
 from ..model.contact import check_restitution
 from ..model.element import Number, Numbers, Ratio, Unit, element, positive

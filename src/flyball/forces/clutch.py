@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..compiler.formulas import formula
-from ..constraints.switch_kinds import FRICTION
+from ..constraints.switches.friction import FRICTION
 from ..errors import ModelError
 from ..math.scalar import choose
 from ..model.element import Law, LawOf, Ratio, element

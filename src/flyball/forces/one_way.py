@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..constraints.switch_kinds import ONE_WAY, RATCHET
+from ..constraints.switches.latches import ONE_WAY, RATCHET
 from ..errors import ModelError
 from ..model.contact import check_restitution
 from ..model.element import Number, Ratio, Unit, element, nonnegative, positive

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import field
+from dataclasses import field, replace
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -12,7 +12,9 @@ from pydantic import BeforeValidator
 
 from ..compiler.formulas import formula
 from ..constraints.blocks import DISTANCE, Row
-from ..constraints.switch_kinds import ELASTIC, FROZEN, STOP
+from ..constraints.switches.elastic_stop import ELASTIC
+from ..constraints.switches.guard_kinds import FROZEN
+from ..constraints.switches.stop import STOP
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
@@ -29,7 +31,7 @@ KIND = 2
 def effort(par, x, rate, laws, load):
     """Return the effort along the rope's length x: -max(0, k (x - x_0) + c rate) if longer than x_0, else zero.
 
-    While its state is fixed as taut or slack (`switch_kinds.FROZEN`), the formula is continued smoothly beyond the
+    While its state is fixed as taut or slack (`guard_kinds.FROZEN`), the formula is continued smoothly beyond the
     corner.
     """
     o = 0.0 * x
@@ -50,6 +52,8 @@ def _list(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+_WORDS = {"closing": ("taut", "goes taut"), "opening": ("slack", "goes slack"), "states": ("taut", "slack")}
+RIGID_ROPE, ELASTIC_ROPE = replace(STOP, **_WORDS), replace(ELASTIC, **_WORDS)  # type: ignore[arg-type]
 Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
 
 
@@ -144,7 +148,7 @@ class Rope(CoordinateForce):
 
     def switches(self) -> tuple[Switch, ...]:
         """Return one switch along its length."""
-        return (Switch(ELASTIC if self.acts() else STOP, path=self.path(), slides=self.acts()),)
+        return (Switch(ELASTIC_ROPE if self.acts() else RIGID_ROPE, path=self.path(), slides=self.acts()),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Return the bounds: its length is the upper one."""

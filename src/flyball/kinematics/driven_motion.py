@@ -30,7 +30,7 @@ from ..results.mobility import Mobility
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, initial_state_at
 from ..simulation.integration_options import default_integration, output_times
-from ..simulation.prescribed_motion import KNOWN_SWITCHES, refuse_passed
+from ..simulation.prescribed_motion import is_checked_afterwards, refuse_passed
 from ..simulation.simulate import integrate_motion
 from ..simulation.solver_switching import CodeSelection, check_specialize
 
@@ -60,7 +60,7 @@ class KinematicsOptions(Options):
 
 def kinematics(model: Model, o: KinematicsOptions) -> Result:
     """Compute positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
-    refuse_unsupported(model, "kinematics", KNOWN_SWITCHES)
+    refuse_unsupported(model, "kinematics", is_checked_afterwards)
     started = time.perf_counter()
     outputs, begin = requested_times(o.times, o.t_start, o.t_end)
     model = model.snapshot()

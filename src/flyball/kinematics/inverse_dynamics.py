@@ -34,7 +34,7 @@ from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, rank_by_
 from ..results.inverse_dynamics import Drive, InverseDynamics
 from ..results.recorded_kinematics import RecordedMotion
 from ..results.result import Result
-from ..simulation.prescribed_motion import KNOWN_SWITCHES
+from ..simulation.prescribed_motion import is_checked_afterwards
 from ..tables.table_definitions import PLANAR, POINT
 from .driven_motion import KinematicsOptions, kinematics, requested_times
 
@@ -229,7 +229,7 @@ class InverseDynamicsOptions(KinematicsOptions):
 
 def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
     """Compute driver efforts and reactions for a given motion: see `Mechanism.inverse_dynamics`."""
-    refuse_unsupported(model, "inverse_dynamics", KNOWN_SWITCHES)
+    refuse_unsupported(model, "inverse_dynamics", is_checked_afterwards)
     model = model.copy() if o.motion else model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
     if o.motion:

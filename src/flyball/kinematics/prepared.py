@@ -24,7 +24,7 @@ from ..laws.bytecode import evaluate_jet
 from ..laws.python_functions import function_fault
 from ..model.body import GROUND, Frame
 from ..model.model import Model
-from ..model.unsupported_elements import SLIDING, refuse_unsupported
+from ..model.unsupported_elements import acts_while_sliding, refuse_unsupported
 from ..results.recorded_kinematics import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
@@ -343,5 +343,5 @@ class PrepareOptions(Options):
 
 def prepare(model: Model, o: PrepareOptions) -> Prepared:
     """Return the prepared mechanism: see `Mechanism.prepare`."""
-    refuse_unsupported(model, "prepare", SLIDING)
+    refuse_unsupported(model, "prepare", acts_while_sliding)
     return Prepared(find_initial_state(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

@@ -15,7 +15,8 @@ import numpy as np
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
-from ..constraints.switch_kinds import BRANCH, ELASTIC, FRICTION
+from ..constraints.switches.guard_kinds import OFF
+from ..constraints.switches.switch_kind import NO_ROW
 from ..derivatives.equation_derivatives import MechanismState
 from ..errors import AnalysisError, ModelError, SingularityError
 from ..model.element import Element
@@ -34,7 +35,7 @@ from ..statics.replacement_joints import (
     support_with_friction,
 )
 from ..statics.stability import RestState
-from ..tables.table_definitions import OFF, VALUE
+from ..tables.table_definitions import VALUE
 
 if TYPE_CHECKING:
     from .linearize import OperatingPointOptions
@@ -258,9 +259,9 @@ def frozen_mode_model(
     parts, slides = list[Element](), list[str]()
     for k, x in enumerate(own.switches):
         e, off = model[x.element.name], last.modes.mode[k] == OFF
-        if x.switch.kind in (ELASTIC, BRANCH):
+        if x.switch.kind.forces == NO_ROW:
             continue
-        if off and x.switch.kind == FRICTION:
+        if off and x.switch.kind.kinetic:
             gone.pop(e.name, None)
             slides.append(e.title)
         elif not off:

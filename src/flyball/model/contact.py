@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator
 
-from ..constraints.switch_kinds import ELASTIC
 from ..errors import ModelError
 from .body import GROUND, Bodies, Body, Ground
 from .element import (
@@ -403,7 +402,7 @@ def has_contact(model: Model) -> bool:
 
 def has_switching_elements(model: Model) -> bool:
     """Return whether any element switches: these, or friction, locks, latches, inextensible ropes; or events."""
-    held = any(w.kind != ELASTIC for e in model.elements() for w in e.switches())
+    held = any(not w.kind.elastic for e in model.elements() for w in e.switches())
     return has_contact(model) or held or any(e.category == "events" for e in model.elements())
 
 

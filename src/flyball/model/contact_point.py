@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -9,11 +10,14 @@ import numpy as np
 
 from ..constraints import corner_on_box, displacement
 from ..constraints.blocks import Row
-from ..constraints.switch_kinds import EDGE, SLIP, STOP
+from ..constraints.switches.contact_slip import EDGE, SLIP
+from ..constraints.switches.stop import STOP
 from .element import element
 from .force import Switch, TwoFrameForce
 from .joint import WorldFrame
 
+GAP = replace(STOP, closing=("touch", "touches"), opening=("part", "parts"), states=("touches", "apart"))
+"""The gap of a contact point."""
 Term = tuple[float, ...]  # the kind of a row and its eight parameters
 
 
@@ -79,7 +83,7 @@ class Touch(TwoFrameForce):
     def switches(self) -> tuple[Switch, ...]:
         """Return the gap switch, and a slip switch for each tangent."""
         seen = () if self.seen is None else (("F", "M", _row(self.seen)),)
-        out = [Switch(STOP, "gap", path=(("F", "M", _row(self.gap)),), seen=seen)]
+        out = [Switch(GAP, "gap", path=(("F", "M", _row(self.gap)),), seen=seen)]
         for k, slip in enumerate(self.slips):
             path = (("F", "M", _row(slip, holonomic=False)),)
             out.append(Switch(SLIP, f"slip_{k + 1}", path=path, slides=k == 0, other="gap"))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
+from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
 from .element import Element, Law, Point, PointPair, nonnegative, positive
 from .geometry import vector
@@ -200,8 +201,8 @@ class Switch:
 
     Attributes
     ----------
-    kind : int
-        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC, RATCHET or SLIP of `constraints.switch_kinds`.
+    kind : SwitchKind
+        One of `constraints.switches`, or of the element's own.
     label : str
         Label of the switch; empty if the element has only one.
     along : tuple of str
@@ -219,7 +220,7 @@ class Switch:
         Whether a single coordinate has a weight too.
     """
 
-    kind: int
+    kind: SwitchKind
     label: str = ""
     along: tuple[str, ...] = ()
     path: tuple[tuple[str, str, Row], ...] = ()

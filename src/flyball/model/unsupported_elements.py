@@ -6,44 +6,62 @@ Each analysis lists the kinds that it supports, in their state at the operating 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterator
 
-from ..constraints.switch_kinds import ELASTIC, FRICTION
+from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
 from .element import Element
 from .model import Model
 
-SLIDING = frozenset({FRICTION})
-"""Kinds that are forces while they slide; without modes they are treated as sliding, by the sign of the rate."""
+Supported = Callable[[SwitchKind], bool]
+"""Whether an analysis supports a kind of switch."""
+
+
+def nothing_else(kind: SwitchKind) -> bool:
+    """Whether an analysis without modes supports a kind of switch."""
+    return False
+
+
+def acts_while_sliding(kind: SwitchKind) -> bool:
+    """Whether switches of a kind are forces while they slide: without modes, by the sign of the rate."""
+    return kind.kinetic
+
+
 CONTACT_CATEGORIES = ("contacts", "limits", "bulk")
 REPLACEMENT_OPTIONS = {"stick_speed": "regularised", "stiffness": "elastic"}
 """Fields that turn an element into a plain force, and the description of that force."""
 
 
-def unsupported_elements(model: Model, knows: Collection[int] = ()) -> Iterator[Element]:
+def unsupported_elements(model: Model, supports: Supported = nothing_else) -> Iterator[Element]:
     """Return parts that only motions support: contacts, sets of bodies, events, and switching elements.
 
-    Elastic elements are forces in every analysis; ``knows`` are further supported kinds (`constraints.switch_kinds`).
+    Elastic elements are forces in every analysis; ``supports`` returns whether the analysis supports another kind of
+    switch.
     """
-    known = {ELASTIC, *knows}
     yield from (*model.contacts, *model.bulk)
     for e in model.elements():
-        if e.category == "events" or any(w.kind not in known for w in e.switches()):
+        if e.category == "events" or any(not (w.kind.elastic or supports(w.kind)) for w in e.switches()):
             yield e
 
 
-def refuse_unsupported(model: Model, analysis: str, knows: Collection[int] = (), *, controlled: bool = False) -> None:
+def refuse_unsupported(
+    model: Model,
+    analysis: str,
+    supports: Supported = nothing_else,
+    *,
+    controlled: bool = False,
+) -> None:
     """Refuse a mechanism with unsupported parts, rather than ignore them.
 
     Raises
     ------
     ModelError
-        If the mechanism has a contact, a set of bodies, an event, or a switching element of a kind not in ``knows``; or
+        If the mechanism has a contact, a set of bodies, an event, or a switching element that is not supported; or
         a controller, unless ``controlled`` says that the analysis supports or may ignore controllers.
     """
     if not controlled:
         refuse_controllers(model, analysis)
-    parts = list(unsupported_elements(model, knows))
+    parts = list(unsupported_elements(model, supports))
     if not parts:
         return
     without = ", ".join(f"{e.name!r}: None" for e in parts)

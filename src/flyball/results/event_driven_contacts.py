@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..constraints.switches.guard_kinds import OFF
 from ..engine.loads import direction_in_space
 from ..engine.rows import characteristic_speed
 from ..math.vec import dot
 from ..model.body import GROUND
 from ..model.contact_point import Touch
-from ..tables.table_definitions import OFF
 from .contacts import SLIP, STICK, ContactBodies, Contacts, concatenate_contacts
 from .recorded_kinematics import term_over_time
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
 from ..model.messages import listing, shortened_list, suggest
 from .phases import Moment
 from .reactions import IMPULSE_COMPONENTS, EventImpulses, impulse_data
-from .wording import EVENT_KINDS
+from .wording import INSTANT_KINDS
 
 if TYPE_CHECKING:
     import pandas
@@ -108,7 +109,7 @@ class Events(Sequence):
             If nothing has that name; the message lists the names that occurred.
         """
         found = [h for h in self._all if h.kind == name or name in h.name.split(", ")]
-        if not found and name not in EVENT_KINDS and name not in (able := self._able()):
+        if not found and name not in (*INSTANT_KINDS, *SwitchKind.transitions) and name not in (able := self._able()):
             names = self.names()
             meant, known = suggest(name, [*names, *sorted(able)]), listing(names) if names else "nothing did"
             raise ModelError(f"nothing named {name!r} happened{meant}; {known}")

@@ -14,22 +14,7 @@ PASSAGE, LOCK_UP, BIFURCATION, SELF_MOTION = "regular passage", "lock-up", "bifu
 """Kinds of singular positions."""
 
 INSTANT_KINDS = ("event", "impact", "kick", "jam", "rest", "turn", "hold", "leave")
-SWITCH_KINDS = (
-    "close",
-    "open",
-    "stick",
-    "slip",
-    "lock",
-    "overrun",
-    "latch",
-    "unlatch",
-    "taut",
-    "slack",
-    "touch",
-    "part",
-)
-EVENT_KINDS = frozenset((*INSTANT_KINDS, *SWITCH_KINDS))
-"""Kinds of events."""
+"""Kinds of events that are no transition of a switch; those are `SwitchKind.transitions`."""
 
 
 NEGLIGIBLE = 1e-10  # relative to the size of its kind: smaller numbers are rounding or iteration errors

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly, undefined_row
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
-from ..constraints.switch_kinds import BRANCH
+from ..constraints.switches.guard_kinds import OFF
 from ..engine import motion
 from ..engine.entry_point import MOTION
 from ..engine.kinematics import load_record
@@ -32,7 +32,7 @@ from ..model.expression_parser import tree_text
 from ..model.force import CoordinateForce
 from ..model.messages import abbreviated
 from ..numerics.integrators import time_loop as ex
-from ..tables.table_definitions import LOAD, OFF, REVOLUTE, VALUE
+from ..tables.table_definitions import LOAD, REVOLUTE, VALUE
 from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
 from .sampling_instants import sampling_limits_steps
 
@@ -493,7 +493,7 @@ def _active_corners(a: Assembly) -> list[str]:
     """Return the labels of laws on whose corners the motion is held."""
     mode = a.compiled.work.modes.mode
     specs = enumerate(a.compiled.structure.switches)
-    return [x.switch.label for k, x in specs if x.switch.kind == BRANCH and mode[k] != OFF]
+    return [x.switch.label for k, x in specs if x.law >= 0 and mode[k] != OFF]
 
 
 def force_fault(c: CompiledMechanism, t: float) -> str:

@@ -13,12 +13,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switch_kinds import BRANCH
+from ..constraints.switches.guard_kinds import G_LAW
 from ..engine.pulse_detection import law_starts
 from ..laws.breakpoints import Breakpoints, Timed, acts_briefly, find_breakpoints, rounding_margin, time_dependent_laws
 from ..numerics.integrators import time_loop as ex
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import G_LAW
 from .solver_switching import mechanism_kind
 
 
@@ -159,7 +158,7 @@ def _find_laws_of_time(c: CompiledMechanism) -> Timed:
     S = c.system
     guards = S.guards.of[S.guards.kind == G_LAW]
     forces = S.forces.laws.ravel()
-    corners = S.switches.law[S.switches.kind == BRANCH]
+    corners = S.switches.law[S.switches.law >= 0]
     starts = np.concatenate([forces, S.rows.law, S.tree.law, guards, corners, S.control_laws])
     return time_dependent_laws(S.code.tolist(), starts.tolist())
 

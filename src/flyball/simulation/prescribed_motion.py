@@ -17,7 +17,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
-from ..constraints.switch_kinds import FRICTION, ONE_WAY, STOP
+from ..constraints.switches.switch_kind import SwitchKind
 from ..engine.entry_point import FOLLOW, run_task
 from ..errors import ModelError
 from ..mobility.null_spaces import jacobian_rank
@@ -185,11 +185,19 @@ def _midpoint_rows(a: Assembly, clock: ex.StepState, known: np.ndarray, interval
     return np.concatenate(rows)[1:]
 
 
-KNOWN_SWITCHES = frozenset({FRICTION, STOP, ONE_WAY})
-"""Kinds of switches that analyses of a prescribed motion support."""
 STOP_TOLERANCE = 1e-9  # allowed excess at a stop, relative to the mechanism's length, a radian, or the largest rate
 CHECKS_PER_INTERVAL, MOST_CHECKS = 8, 4000  # times checked between two output times; in total
 CHECK_ROUNDS = 4
+
+
+def is_visible(kind: SwitchKind) -> bool:
+    """Whether a motion shows that it violates the rule of a switch."""
+    return kind.excess(np.zeros(1), np.zeros(1), (0.0, 0.0)) is not None
+
+
+def is_checked_afterwards(kind: SwitchKind) -> bool:
+    """Whether analyses of a prescribed motion support a kind of switch."""
+    return kind.kinetic or is_visible(kind)
 
 
 def refuse_passed(result: Result, analysis: str, again: Callable[[np.ndarray], Result]) -> None:
@@ -212,7 +220,7 @@ def refuse_passed(result: Result, analysis: str, again: Callable[[np.ndarray], R
     """
     seen, t = _switch_history(result), result.t
     remarks = _friction_at_rest(seen)
-    stops = [x.element.title for x in seen.specs if x.switch.kind in (STOP, ONE_WAY)]
+    stops = [x.element.title for x in seen.specs if is_visible(x.switch.kind)]
     for k in range(CHECK_ROUNDS if stops else 0):
         more = _intermediate_times(t) if k == 0 else _times_of_peaks(t, seen)
         if not len(more):
@@ -270,18 +278,19 @@ def _intermediate_times(t: np.ndarray) -> np.ndarray:
 def _times_of_peaks(t: np.ndarray, history: SwitchHistory) -> np.ndarray:
     """Return times at which cubics through values and rates pass a stop, or run backwards at a freewheel."""
     h, out = np.diff(t), [np.zeros(0)]
-    for spec, x, rate, (lower, upper), near in zip(*history, strict=True):
+    for spec, x, rate, bounds, near in zip(*history, strict=True):
         # x + h (r s + b s^2 + a s^3), s from 0 to 1
         r, rise = rate[:-1], np.diff(x) / h
         a, b = rate[1:] + r - 2.0 * rise, 3.0 * rise - 2.0 * r - rate[1:]
         with np.errstate(all="ignore"):
             root = np.sqrt(b * b - 3.0 * a * r)
-            turns = -b / (3.0 * a) if spec.switch.kind == ONE_WAY else (np.array([root, -root]) - b) / (3.0 * a)
+            turns = (np.array([root, -root]) - b) / (3.0 * a) if spec.switch.kind.bounded else -b / (3.0 * a)
             turns = np.where(a == 0.0, -r / (2.0 * b), turns)
         s = np.where((turns > 0.0) & (turns < 1.0), turns, 0.0)
         at, going = x[:-1] + h * s * (r + s * (b + s * a)), r + s * (2.0 * b + s * 3.0 * a)
-        past = {STOP: (at > upper + near) | (at < lower - near), ONE_WAY: going < -near}
-        out.append((t[:-1] + h * s)[(s > 0.0) & past.get(spec.switch.kind, np.zeros(s.shape, bool))])
+        excess = spec.switch.kind.excess(at, going, bounds)
+        if excess is not None:
+            out.append((t[:-1] + h * s)[(s > 0.0) & (excess > near)])
     return np.unique(np.concatenate(out))
 
 
@@ -294,9 +303,9 @@ def _quantity_rate(c, spec: SwitchSpec, v: np.ndarray) -> float:
 
 
 def _refuse_passed_stops(t: np.ndarray, history: SwitchHistory, analysis: str) -> None:
-    for spec, x, rate, (lower, upper), near in zip(*history, strict=True):
-        over = {STOP: np.maximum(x - upper, lower - x), ONE_WAY: -rate}.get(spec.switch.kind, np.zeros(0))
-        if not (over > near).any():
+    for spec, x, rate, bounds, near in zip(*history, strict=True):
+        over = spec.switch.kind.excess(x, rate, bounds)
+        if over is None or not (over > near).any():
             continue
         e, what = spec.element, " - ".join(spec.switch.along) or "its length"
         raise ModelError(
@@ -311,7 +320,7 @@ def _friction_at_rest(history: SwitchHistory) -> list[str]:
     out = []
     for spec, rate in zip(history.specs, history.rate, strict=True):
         still = np.abs(rate) <= STOP_TOLERANCE * np.abs(rate).max(initial=0.0)
-        if spec.switch.kind == FRICTION and still.any():
+        if spec.switch.kind.kinetic and still.any():
             out.append(
                 f"{spec.element.title} is taken as nothing where it does not slide: what it carries there of what the "
                 f"drives need is not determined"

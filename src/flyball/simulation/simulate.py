@@ -12,7 +12,6 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switch_kinds import BRANCH, FRICTION
 from ..engine.entry_point import FOLLOW, INTEGRATE
 from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
 from ..engine.stabilization import TIGHT_G, TIGHT_V
@@ -206,9 +205,9 @@ def integrate_motion(
 
 
 def _no_stops(start: InitialState) -> bool:
-    """Return whether all switches are corners of laws or friction, and there are no events."""
+    """Return whether there are no events, and all switches are corners of laws or sliding friction."""
     s = start.assembly.compiled.structure
-    return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
+    return bool(s.switches) and not s.model.events and all(x.law >= 0 or x.switch.kind.kinetic for x in s.switches)
 
 
 def _fully_driven(start: InitialState) -> bool:

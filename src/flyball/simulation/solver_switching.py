@@ -23,7 +23,7 @@ import numpy as np
 
 from .. import codegen
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switch_kinds import BRANCH
+from ..constraints.switches.guard_kinds import OFF
 from ..engine.entry_point import MOTION, evaluate_state
 from ..errors import ModelError
 from ..numerics.eigen import dominant_eigenvalue
@@ -31,7 +31,7 @@ from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.explicit_runge_kutta import reset_rejections, scaled_norm
 from ..tables.coordinate_choice import right_hand_side_cost
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import OFF, VALUE, assign, named_arrays
+from ..tables.table_definitions import VALUE, assign, named_arrays
 from ..tables.values import Values
 
 AUTO_CODE = "auto"
@@ -455,8 +455,7 @@ def slides_on_corner(c: CompiledMechanism) -> bool:
     """
     if not len(c.system.switches.row):
         return False
-    kinds, modes = c.system.switches.kind, c.work.modes.mode
-    return bool(((kinds == BRANCH) & (modes != OFF)).any())
+    return bool(((c.system.switches.law >= 0) & (c.work.modes.mode != OFF)).any())
 
 
 # The fastest mode about the present state, and its amplitude.

@@ -19,7 +19,8 @@ import numpy as np
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
-from ..constraints.switch_kinds import FRICTION, LOCK, ONE_WAY, RATCHET, STATIC, STOP
+from ..constraints.switches.guard_kinds import STATIC
+from ..constraints.switches.switch_kind import INTERVAL
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
 from ..engine.entry_point import MOTION
@@ -140,8 +141,6 @@ FRICTION_ITERATIONS, FRICTION_TOLERANCE = (
     30,
     1e-10,
 )  # iterations for load-dependent friction, and relative change that counts as none
-EITHER_SIGN = 0.0
-"""Sign of a constraint that can push in both directions."""
 
 
 @element
@@ -163,12 +162,15 @@ class ActiveConstraints:
     signs : dict
         Name -> +1 if it can only push its quantity up, -1 only down, 0 both.
     friction_elements : dict
-        Active friction elements: name -> element.
+        Active friction elements whose limit follows from a law: name -> element.
+    strengths : dict
+        Largest forces of other elements that hold either way up to a limit: name -> number.
     """
 
     parts: list[Element] = field(default_factory=list)
     signs: dict[str, float] = field(default_factory=dict)
     friction_elements: dict[str, Element] = field(default_factory=dict)
+    strengths: dict[str, float] = field(default_factory=dict)
 
 
 def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
@@ -191,26 +193,19 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         value = float(c.work.sensed[VALUE, x.measured])
         size = 1.0 if _is_rotation(model, x.element, x.switch) else c.values.length
         lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
-        sign = _push_sign(x.switch.kind, value, lower, upper, CLOSED_GAP * size)
+        sign = x.switch.kind.push_direction(value, (lower, upper), CLOSED_GAP * size)
         if sign is not None:
             out.parts.append(holding_constraint(x.element, x.switch, c.values, value))
             out.signs[x.element.name] = sign
-            if x.switch.kind == FRICTION:
+            if x.switch.kind.forces == INTERVAL and x.element.acts():
                 out.friction_elements[x.element.name] = x.element
+            elif x.switch.kind.forces == INTERVAL:
+                out.strengths[x.element.name] = float(S.switch_numbers.strength[k])
     return out
 
 
 def _is_rotation(model: Model, e: Element, w: Switch) -> bool:
     return bool(w.along) and model.unit(w.along[0], e) == "rad"
-
-
-def _push_sign(kind: int, x: float, lower: float, upper: float, near: float) -> float | None:
-    """Direction in which a switch can push at rest; None if it is inactive."""
-    if kind == STOP:
-        return 1.0 if abs(x - lower) <= near else -1.0 if abs(x - upper) <= near else None
-    if kind == RATCHET:  # position of a tooth, and the pitch
-        return 1.0 if abs(x - lower - upper * round((x - lower) / upper)) <= near else None
-    return {FRICTION: EITHER_SIGN, LOCK: None, ONE_WAY: 1.0}.get(kind)
 
 
 def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
@@ -257,7 +252,8 @@ def support_with_friction(
         result = snapshot(MechanismState.resting(x.c, x.t, x.q, found.lam))
         before, bears = (
             bears,
-            {
+            held.strengths
+            | {
                 k: friction_capacity(model, place.at, e, _joint_reactions(result))
                 for k, e in held.friction_elements.items()
             },

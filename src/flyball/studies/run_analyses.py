@@ -30,7 +30,7 @@ from ..model.unsupported_elements import refuse_unsupported, unsupported_element
 from ..results.equilibrium import NOT_JUDGED, STABLE
 from ..results.linear_model import LinearModel
 from ..simulation.method_choice import SimulateOptions
-from ..simulation.prescribed_motion import KNOWN_SWITCHES
+from ..simulation.prescribed_motion import is_checked_afterwards
 from ..simulation.simulate import simulate
 from ..statics.controller_states import refuse_sampled_controllers
 from ..statics.equilibrium import equilibrium, rest_options
@@ -215,7 +215,7 @@ class KinematicsAnalysis(TimedAnalysis):
 
     def refuse(self, model: Model) -> None:
         """Refuse elements whose state depends on a motion."""
-        refuse_unsupported(model, self.title, KNOWN_SWITCHES)
+        refuse_unsupported(model, self.title, is_checked_afterwards)
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
         """Options of the study, with its output times."""

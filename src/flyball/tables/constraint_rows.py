@@ -16,7 +16,14 @@ import numpy as np
 from ..compiler.kernels import CodeTable, code_table
 from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
 from ..constraints.registry import SIGNATURES
-from ..constraints.switch_kinds import BRANCH, EDGE, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ..constraints.switches.guard_kinds import (
+    G_LAW,
+    G_OWN,
+    G_SHARED,
+)
+from ..constraints.switches.guard_kinds import SIGNATURES as SWITCH_SIGNATURES
+from ..constraints.switches.lock import LOCK
+from ..constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW
 from ..model.body import Body, Driver, Frame, Initial
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf
@@ -33,20 +40,6 @@ from .table_definitions import (
     COUPLED,
     EITHER,
     FALLING,
-    G_BACK,
-    G_CONE,
-    G_CORNER,
-    G_EDGE,
-    G_HOLDS,
-    G_LAW,
-    G_LOWER,
-    G_PRESS_LOWER,
-    G_PRESS_UPPER,
-    G_PULL,
-    G_SHARED,
-    G_SLIDES,
-    G_TURNS,
-    G_UPPER,
     RISING,
     SCHUR,
     TERM_KINDS,
@@ -315,19 +308,6 @@ def add_event_guards(s: Structure) -> None:
             s.guards.append((G_LAW, at, DIRECTIONS[e.direction]))
 
 
-GUARD_KINDS = {
-    STOP: (G_LOWER, G_UPPER, G_PULL),
-    FRICTION: (G_HOLDS, G_SLIDES),
-    ONE_WAY: (G_BACK, G_PULL),
-    ELASTIC: (G_PRESS_LOWER, G_PRESS_UPPER),
-    RATCHET: (G_LOWER, G_SLIDES, G_PULL),
-    BRANCH: (G_CORNER,),
-    SLIP: (G_CONE, G_TURNS),
-    EDGE: (G_EDGE,),
-}
-"""Guards of each kind of switch."""
-
-
 @dataclass
 class SwitchSpec:
     """One switch of a structure."""
@@ -372,7 +352,7 @@ def measure_switches(s: Structure) -> None:
 def add_switch_rows(s: Structure) -> None:
     """Add the rows of switches behind all others."""
     for e, w in declared_switches(s.model):
-        if w.kind in (ELASTIC, EDGE):
+        if w.kind.forces == NO_ROW:
             s.switches.append(SwitchSpec(e, w, -1, s.measured[switch_quantity(e, w)]))
             continue
         row, first = len(s.rows), len(s.rows)
@@ -389,7 +369,7 @@ def add_switch_rows(s: Structure) -> None:
         if spec.switch.other:
             one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
             spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
-            like = [i for i in one if i != k and s.switches[i].switch.kind == spec.switch.kind == SLIP]
+            like = [i for i in one if i != k and s.switches[i].switch.kind.forces == spec.switch.kind.forces == DISC]
             spec.partner = like[0] if like else -1
 
     for joint in released_joints(s.model):
@@ -407,45 +387,41 @@ def fill_switch_tables(s: Structure) -> None:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["forces"].switch[spec.force] = k
         s.guards += [(kind, k, FALLING) for kind in _guards_of(k, spec)]
+        if hasattr(spec.switch.kind, "guard"):
+            s.guards.append((G_OWN, k, FALLING))
     if _may_be_indeterminate(s):
         s.guards.append((G_SHARED, 0, FALLING))
     s.tables["switches"] = integer_table(
-        Switches, [(x.row, x.measured, x.switch.kind, x.force, x.law, x.partner, x.other) for x in s.switches]
+        Switches, [(x.row, x.measured, x.switch.kind.forces, x.force, x.law, x.partner, x.other) for x in s.switches]
     )
     s.tables["guards"] = integer_table(Guards, s.guards)
+    s.guard_code = [
+        code_table(type(s.switches[of].switch.kind), SWITCH_SIGNATURES, SWITCH_SIGNATURES) if kind == G_OWN else None
+        for kind, of, _ in s.guards
+    ]
 
 
 def _may_be_indeterminate(s: Structure) -> bool:
     """Whether forces of friction may be indeterminate, because several constraints can be active together."""
-    gaps = {x.other for x in s.switches if x.switch.kind == SLIP}
+    gaps = {x.other for x in s.switches if x.switch.kind.forces == DISC}
     holding = [x for k, x in enumerate(s.switches) if x.row >= 0 and k not in gaps and not -1 < x.partner < k]
-    return len(holding) > 1 and any(x.switch.kind in (FRICTION, SLIP) for x in holding)
+    return len(holding) > 1 and any(x.switch.kind.forces in (INTERVAL, DISC) for x in holding)
 
 
 def _guards_of(k: int, x: SwitchSpec) -> tuple[int, ...]:
     """Guards of a switch; of the two tangents of a contact point, the first has those of both."""
-    if x.switch.kind == SLIP and -1 < x.partner < k:
-        return ()
-    return GUARD_KINDS.get(x.switch.kind, ())
-
-
-NUMBER_FIELDS = {SLIP: ("static_friction", "kinetic_friction"), RATCHET: ("tooth", "pitch", "restitution")}
-"""Fields of `SwitchNumbers` that an element's ``switched`` gives, by the kind of switch; others: the first fields."""
+    return () if -1 < x.partner < k else x.switch.kind.guards
 
 
 def fill_switch_numbers(s: Structure, of: Any, table: SwitchNumbers, asks: Any, separation: Any) -> None:
     """Fill in the numbers of switches from those of their elements; ``separation``: distance of an element's points."""
     for k, spec in enumerate(s.switches):
-        kind = spec.switch.kind
-        if kind != BRANCH and not asks(spec.element):
+        kind, of_law = spec.switch.kind, spec.law >= 0
+        if not (of_law or asks(spec.element)):
             continue
         given = (
-            ()
-            if kind == BRANCH
-            else spec.element.switched(of[spec.element.name], spec.switch.label, separation(spec.element))
+            () if of_law else spec.element.switched(of[spec.element.name], spec.switch.label, separation(spec.element))
         )
-        named = dict(zip(NUMBER_FIELDS.get(kind, SwitchNumbers._fields), given, strict=False))
-        if kind == RATCHET:  # initially between these teeth
-            named |= {"lower": named["tooth"], "upper": named["tooth"] + named["pitch"]}
+        named = kind.initial_numbers(dict(zip(kind.numbers, given, strict=False)))
         for name, column in zip(table._fields, table, strict=True):
             column[k] = named.get(name, {"lower": -np.inf, "upper": np.inf}.get(name, 0.0))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.blocks import DISTANCE
-from ..constraints.switch_kinds import BRANCH
+from ..constraints.switches.law_corner import CORNER
 from ..laws.bytecode import SENSOR
 from ..laws.compilation import CornerLookup, calls_python, compile_decision, has_corners, may_be_steep, node_key
 from ..laws.interval_evaluation import table_corners
@@ -219,7 +219,7 @@ class NonsmoothPoints:
                 s.depth = max(s.depth, depth)
                 s.laws[at] = law.where
                 self.known[key] = len(s.switches)
-                s.switches.append(SwitchSpec(e, Switch(BRANCH, label=law.where), law=at))
+                s.switches.append(SwitchSpec(e, Switch(CORNER, label=law.where), law=at))
             return -1 - self.known[key], 1.0
 
         return corner

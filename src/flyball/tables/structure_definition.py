@@ -92,6 +92,7 @@ class Structure:
     forces: list[Force] = field(default_factory=list)
     force_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined force
     term_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined term
+    guard_code: list[CodeTable | None] = field(default_factory=list)  # code table of each guard of a user's switch
     switches: list[Any] = field(default_factory=list)  # rows with modes (`constraint_rows.SwitchSpec`)
     branches: Any = (
         None  # finds the sides of nonsmooth points (`law_inputs.NonsmoothPoints`); None: laws decide themselves
@@ -130,7 +131,7 @@ class Structure:
     @cached_property
     def code_tables(self) -> set[CodeTable]:
         """Code tables of all user-defined classes in it."""
-        return {x for x in (*self.force_code, *self.term_code) if x is not None}
+        return {x for x in (*self.force_code, *self.term_code, *self.guard_code) if x is not None}
 
     @property
     def states(self) -> list[str]:

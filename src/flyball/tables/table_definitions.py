@@ -22,11 +22,7 @@ FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
 TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
 FORCE_BY_ADDRESS = 1000  # kind of forces with a code table: not the number of a built-in element
-# modes of switches: the row is inactive, holds its quantity where it is, or keeps it at rest
-OFF, HELD, STEADY = 0.0, 1.0, 2.0
-# kinds of guards; directions of zero crossings
-G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
-G_CONE, G_TURNS, G_EDGE, G_SHARED = range(10, 14)
+# directions of zero crossings
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Work.sensed: of each measured quantity; then, in separate columns, of its rate as a value
 VALUE, RATE, BIAS = range(3)
@@ -168,11 +164,11 @@ class LoadTerms(NamedTuple):
 
 
 class Switches(NamedTuple):
-    """Rows with modes; kinds are those of `model/force.py` [(nw,)]."""
+    """Rows with modes [(nw,)]."""
 
     row: Int1  # -1: none
     measured: Int1  # quantity
-    kind: Int1
+    forces: Int1  # that the row can carry: NO_ROW, ANY_FORCE, ... of `constraints.switches.switch_kind`
     force: Int1  # force that acts while it slides; -1: none
     law: Int1  # nonsmooth point of a law; -1: none
     partner: Int1  # of a slip, the slip along the other tangent; -1: none
@@ -191,6 +187,7 @@ class SwitchNumbers(NamedTuple):
     pitch: Number1
     static_friction: Number1  # of a slip: coefficient at rest
     kinetic_friction: Number1
+    strength: Number1  # largest force that the row can hold, where no force element gives it
 
 
 class Guards(NamedTuple):
@@ -267,6 +264,7 @@ class System(NamedTuple):
     switches: Switches
     switch_numbers: SwitchNumbers
     guards: Guards
+    guard_code: CodeTables1  # (ng,): code table of the guard of a user's kind of switch; 0 of others
     control_laws: Int1  # (nc,): law of the rate of each controller's state, the first of all states; -1: sampled
     kind_terms: Int1  # (TERM_KINDS + 1,): first term of each kind
     sizes: Sizes

@@ -118,7 +118,9 @@ class Values:
         """Restore in another process, where code has other addresses."""
         vars(self).update(state)
         self.system = self.system._replace(
-            force_code=table_addresses(self.structure.force_code), term_code=table_addresses(self.structure.term_code)
+            force_code=table_addresses(self.structure.force_code),
+            term_code=table_addresses(self.structure.term_code),
+            guard_code=table_addresses(self.structure.guard_code),
         )
 
 
@@ -203,7 +205,8 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
     system = System(  # type: ignore[misc]
         **s.tables,
         bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
-        force_code=table_addresses(s.force_code), term_code=table_addresses(s.term_code), const=const,
+        force_code=table_addresses(s.force_code), term_code=table_addresses(s.term_code),
+        guard_code=table_addresses(s.guard_code), const=const,
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..constraints.switch_kinds import BRANCH, EDGE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
-from ..model.contact_point import Touch
+from ..constraints.switches.guard_kinds import FROZEN, OFF
 from ..model.element import written_fields
 from ..model.joint import Joint
 from ..model.toml_file import dumps
 from ..results.events import EventRecord
 from ..results.phases import Moment
 from ..results.wording import tuple_text
-from ..tables.table_definitions import OFF
 from .animation import attachment_text, motion_to_show, record_motion
 from .figures import standard_figures
 from .page import player_page
@@ -46,12 +44,6 @@ class ReportTable:
 
 MAX_WITHOUT_SUMMARY = 12  # number of events listed without a summary
 FIRST_LISTED, LAST_LISTED = 150, 50  # number of listed events if there are more
-SWITCH_WORDS = {
-    STOP: ("closed", "open"), ELASTIC: ("pressed", "open"), FRICTION: ("sticks", "slides"), RATCHET: ("holds", "free"),
-    ONE_WAY: ("holds", "overruns"), LOCK: ("locked", "free"),
-}  # fmt: skip
-"""Words for the active and inactive state of each kind of switch."""
-ROPE_WORDS, CONTACT_WORDS = ("taut", "slack"), ("touches", "apart")
 
 
 def events(result: Result) -> list[ReportTable]:
@@ -115,11 +107,11 @@ def holding(result: Result) -> ReportTable:
     held = _active_switches(result)
     counts, rows = result.events.counts(), []
     for k, x in enumerate(result.phases.all[0].values.structure.switches):
-        if x.switch.kind in (BRANCH, EDGE, SLIP):
+        yes, no = x.switch.kind.states
+        if not yes:
             continue
-        yes, no = _switch_words(x)
         told = [yes if held[k, i] else no for i in (0, -1)]
-        if result.phases.all[-1].modes.released[k] != 0.0:
+        if result.phases.all[-1].modes.released[k] != 0.0 and not x.switch.kind.permanent:
             told[-1] = "released"
         event = x.element.category == "events"
         name = x.switch.label if event else x.element.name
@@ -132,15 +124,9 @@ def holding(result: Result) -> ReportTable:
 def _active_switches(result: Any) -> np.ndarray:
     """Return whether each switch is active at each output time, (ns, n)."""
     every = result.phases.all[0].values.structure.switches
-    elastic = np.array([x.switch.kind == ELASTIC for x in every], bool)
+    elastic = np.array([x.switch.kind.elastic for x in every], bool)
     pressed = (result.phases.sigma != FROZEN) & (result.phases.sigma != 0.0)
     return np.where(elastic[:, None], pressed, result.phases.mode != OFF)
-
-
-def _switch_words(x: Any) -> tuple[str, str]:
-    if x.switch.path:
-        return CONTACT_WORDS if isinstance(x.element, Touch) else ROPE_WORDS
-    return SWITCH_WORDS[x.switch.kind]
 
 
 def _acts_on_text(x: Any) -> str:

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.switch_kinds import BY_RATE
+from ...constraints.switches.guard_kinds import BY_RATE, HELD
 from ...engine.loads import force_row, rest_speed, wrench_power
 from ...errors import AnalysisError
 from ...laws.bytecode import STACK_RESERVE, evaluate, evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.table_definitions import HELD
 from ..event_driven_contacts import ContactHistory
 from ..phases import RecordedModes, stored_reference
 from ..recorded_kinematics import coordinate_frames, turned_record
@@ -109,7 +108,7 @@ class ForceView(PartView):
                 held, way = stretches.mode[k] == HELD, stretches.sigma[k]
                 effort = effort + self._result.multipliers[:, s.switches[k].row]
                 side = np.where(held, np.where(way == 0.0, 1.0, way), side)
-        return x, rate, effort, side
+        return x, rate, effort, side + 0.0
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the values of a law over time."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...assembly.compiled_mechanism import CompiledMechanism
-from ...constraints.switch_kinds import ELASTIC, FROZEN, LOCK, RATCHET, STOP
+from ...constraints.switches.guard_kinds import FROZEN, HELD, OFF
 from ...engine.entry_point import MOTION, evaluate_state
 from ...engine.guards import ForceDistribution, empty_distribution
 from ...errors import SimulationError
@@ -24,7 +24,7 @@ from ...numerics.integrators.time_loop import CURRENT, StepState
 from ...results.result import Result
 from ...tables.constraint_rows import SwitchSpec
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import HELD, OFF, VALUE
+from ...tables.table_definitions import VALUE
 from ..initial_state import InitialState
 
 
@@ -219,22 +219,13 @@ def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
     S, W, out = here.c.system, here.c.work, dict[int, float]()
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
     for s, spec in enumerate(here.structure.switches):
-        x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
-        if kind == RATCHET and W.modes.mode[s] == HELD:
-            tooth, pitch = S.switch_numbers.tooth[s], S.switch_numbers.pitch[s]
-            off = (W.modes.hold[s] - tooth) / pitch
-            past = abs(off - round(off)) * pitch
-        elif kind == STOP:
-            past = max(W.modes.lower[s] - x, x - W.modes.upper[s])
-            if W.modes.mode[s] == HELD and past <= near[s]:
-                side = (W.modes.lower if ways[s] > 0.0 else W.modes.upper)[s]
-                W.modes.hold[s] = side
-                if abs(x - side) > near[s]:
-                    W.modes.mode[s], ways[s] = OFF, 0.0
-        else:
-            continue
-        if past > near[s]:
-            out[s] = float(past)
+        kind = spec.switch.kind
+        if kind.keeps_bounds:
+            past = kind.distance_from_bounds(W.modes, S.switch_numbers, s, W.sensed[VALUE, spec.measured])
+            if past > near[s]:
+                out[s] = past
+            elif W.modes.mode[s] == HELD:
+                kind.follow_bound(W.modes, ways, s, W.sensed[VALUE, spec.measured], near[s])
     return out
 
 
@@ -275,14 +266,14 @@ def release(here: EventContext, e: Event, a: Release) -> str:
     """Release coordinates, a joint, a limit or a rope."""
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
-    held, kinds = lock_target(here.structure.model, e, a), here.c.system.switches.kind
+    held, switches = lock_target(here.structure.model, e, a), here.structure.switches
     every = switch_numbers_of(here, held.coordinates, held.joint, held.element)
     if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
         return f"{a.what} was {'released already' if held.element else 'not locked'}"
     for k in every:
         if held.element:
             here.given -= elastic_energy(here, k)
-        W.modes.mode[k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
+        W.modes.mode[k], ways[k] = OFF, FROZEN if switches[k].switch.kind.elastic else 0.0
         if held.element:
             W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = RELEASED, -np.inf, np.inf
     return f"released {a.what}"
@@ -291,7 +282,7 @@ def release(here: EventContext, e: Event, a: Release) -> str:
 def elastic_energy(here: EventContext, k: int) -> float:
     """Return the energy [J] of an elastic switch at the state last evaluated; releasing it removes that energy."""
     S, W = here.c.system, here.c.work
-    if S.switches.kind[k] != ELASTIC:
+    if not here.structure.switches[k].switch.kind.elastic:
         return 0.0
     x = W.sensed[VALUE, S.switches.measured[k]]
     depth = max(W.modes.lower[k] - x, x - W.modes.upper[k], 0.0)
@@ -300,12 +291,11 @@ def elastic_energy(here: EventContext, k: int) -> float:
 
 def switch_numbers_of(here: EventContext, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
     """Return the switches that lock these coordinates, or belong to a joint or element."""
-    kinds = here.c.system.switches.kind
     out = []
     for k, spec in enumerate(here.structure.switches):
         own = isinstance(spec.element, Event)
         if (own and spec.switch.label in coordinates) or (
-            not own and spec.element.name == (joint or element) and (kinds[k] == LOCK) == bool(joint)
+            not own and spec.element.name == (joint or element) and spec.switch.kind.commanded == bool(joint)
         ):
             out.append(k)
     return out
@@ -322,10 +312,8 @@ def restore_locks(here: EventContext, before: Result) -> None:
         j = old.get((spec.element.name, spec.switch.label))
         if j is None:
             continue
-        if spec.switch.kind == LOCK:
+        if spec.switch.kind.commanded:
             W.modes.mode[k], W.modes.hold[k] = last.modes.mode[j], last.modes.hold[j]
         elif last.modes.released[j] == RELEASED:
             W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = RELEASED, -np.inf, np.inf
-            W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] + k] = (
-                FROZEN if spec.switch.kind == ELASTIC else 0.0
-            )
+            W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] + k] = FROZEN if spec.switch.kind.elastic else 0.0

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...constraints.switch_kinds import ELASTIC, RATCHET, STOP
+from ...constraints.switches.guard_kinds import HELD
 from ...engine.kinematics import store_ground_frames, twist_column
 from ...errors import FlyballError, SimulationError
 from ...model.body import Body, Frame
@@ -25,7 +25,7 @@ from ...tables.contact_places import contact_places
 from ...tables.element_numbers import names_in
 from ...tables.law_inputs import forces_in_events
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import HELD, VALUE, assign, map_arrays
+from ...tables.table_definitions import VALUE, assign, map_arrays
 from ...tables.values import Values, values
 from .context import (
     EventContext,
@@ -136,7 +136,7 @@ def _move_bounds(here: EventContext, old: Values) -> None:
     now, then = S.switch_numbers, old.system.switch_numbers
     moved = (now.lower != then.lower) | (now.upper != then.upper)
     for s in np.flatnonzero((W.modes.released == 0.0) & moved).tolist():
-        if S.switches.kind[s] in (STOP, ELASTIC, RATCHET):
+        if here.structure.switches[s].switch.kind.bounded:
             W.modes.lower[s], W.modes.upper[s] = now.lower[s], now.upper[s]
 
 
@@ -179,11 +179,7 @@ def _refuse_violated_bounds(here: EventContext, who: str) -> None:
         k = max(past, key=past.__getitem__)
         spec, unit = s.switches[k], switch_units(s)[k]
         bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
-        said = (
-            "it is held where no tooth is"
-            if spec.switch.kind == RATCHET
-            else violated_rule(spec, float(x), bounds, unit)
-        )
+        said = spec.switch.kind.misplaced or violated_rule(spec, float(x), bounds, unit)
         raise SimulationError(
             f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
             f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "

@@ -16,7 +16,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...constraints.switch_kinds import BRANCH
+from ...constraints.switches.guard_kinds import (
+    DISTANCE_GUARDS,
+    FORCE_GUARDS,
+    G_BACK,
+    G_CORNER,
+    G_SHARED,
+    HELD,
+)
 from ...engine.calls import OutputBuffer
 from ...engine.entry_point import INTEGRATE, MOTION, REPORT, engine, run_task
 from ...engine.guards import distribute_forces_kernel, update_null_vectors_kernel
@@ -43,20 +50,7 @@ from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals,
 from ...progress import ReportProgress
 from ...results.phases import Phase, RecordedModes, event_energies, phases_or_none
 from ...results.result import Result
-from ...tables.table_definitions import (
-    G_BACK,
-    G_CONE,
-    G_CORNER,
-    G_HOLDS,
-    G_LOWER,
-    G_PULL,
-    G_SHARED,
-    G_UPPER,
-    HELD,
-    OFF,
-    VALUE,
-    assign,
-)
+from ...tables.table_definitions import VALUE, assign
 from ..implicit.integrators import implicit_integrator
 from ..integration_intervals import IMPLICIT_STEP_WEIGHT, SegmentEnd, SmoothIntervals, known_breaks
 from ..integration_options import Integration
@@ -149,7 +143,6 @@ def accumulation_point(past: list[float]) -> float:
 
 
 CHECKS_PER_STEP = NODES - 1 + CHECK_NODES  # least number of points of a step at which guards are evaluated
-GAP_GUARDS = (G_LOWER, G_UPPER)  # guards of open stops and contacts
 
 
 def guard_check_remark(loop: GuardedLoop) -> str:
@@ -215,7 +208,7 @@ def missed_crossings(here: EventContext, loop: GuardedLoop) -> frozenset[int]:
         kind, s = int(S.guards.kind[g]), int(S.guards.of[g])
         if kind == G_CORNER:
             out.add(s)
-        elif kind in GAP_GUARDS:
+        elif kind in DISTANCE_GUARDS:
             before, now = np.abs(loop.desk.moving[:, 1, S.switches.measured[s]])
             if before <= SLOW_SHARE * now:
                 out.add(s)
@@ -233,7 +226,7 @@ class PhaseRecorder:
         c, W = here.c, here.c.work
         n = len(here.structure.switches)
         ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
-        if any(x.switch.kind == BRANCH and W.modes.mode[k] != OFF for k, x in enumerate(here.structure.switches)):
+        if slides_on_corner(c):
             ways = _switch_states(here, rows)
         _clear_held_rates(here, rows)
         distribute_forces(here, rows)
@@ -316,7 +309,7 @@ CALL_SECONDS = 0.05  # intended duration of one call of the compiled loop [s]
 ENDLESS = 2000  # number of events within `AT_ONCE` that counts as endless
 REPORTED_EVENTS = 20  # last events that the message names
 CONTACT_TOLERANCE = 1e-10  # distance at which a stop is reached, relative to the mechanism's length or a radian
-HELD_GUARDS = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of active rows, by the forces that they carry
+HELD_GUARDS = (*FORCE_GUARDS, G_SHARED, G_CORNER)  # guards of active rows, by the forces that they carry
 AT_ONCE = 1e-9  # part of the time span within which `ENDLESS` events are endless
 
 
@@ -612,7 +605,7 @@ class EventDrivenMotion:
         if isinstance(self.loop, GuardedLoop):
             note_rounding_zeros(here, self.loop)
         n, kinds, of = instant_problem(here), here.c.system.guards.kind, here.c.system.guards.of
-        values, sides = n.guards(), np.isin(kinds, (*GAP_GUARDS, G_BACK))
+        values, sides = n.guards(), np.isin(kinds, (*DISTANCE_GUARDS, G_BACK))
         at = sides & (np.abs(values) <= CONTACT_TOLERANCE * n.unit[np.where(sides, of, 0)]) if sides.any() else sides
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HELD_GUARDS)) | at)
         if fired := [*against.tolist(), *passed_at_jump_time(here, before)]:

@@ -6,35 +6,24 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...constraints.switch_kinds import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ...constraints.switches.guard_kinds import BY_RATE, FROZEN, G_LAW, G_SHARED, OFF
+from ...constraints.switches.switch_kind import DISC, ONE_SIDED
 from ...errors import ModelError
 from ...model.contact_point import Touch
 from ...model.joint import Joint
 from ...numerics.complementarity.dense_problem import FRICTION_LINE, HOLD_IMPOSSIBLE, SLIDING
 from ...results.events import EventRecord
 from ...results.reactions import EventImpulses
-from ...tables.table_definitions import G_LAW, G_SHARED, OFF
 from ..diagnosis import InitialOverlap, UnresolvedInstant, body_names, jam_message
 from .context import value_in_words
 from .impacts import Jump
 from .instant_problem import InstantProblem, ProblemRow
 from .mode_selection import ModeDecision, element_titles
 
-ROLE_WORDS = {
-    STOP: "is closed",
-    RATCHET: "is latched",
-    FRICTION: "has friction",
-    ONE_WAY: "goes one way only",
-    SLIP: "has friction",
-    LOCK: "is locked",
-}
-
 
 def rows_in_words(n: InstantProblem, parts: list[ProblemRow]) -> str:
     """Name the elements of rows, with their roles."""
-    seen = dict.fromkeys(
-        (n.here.structure.switches[p.switch].element.title, ROLE_WORDS[n.kind[p.switch]]) for p in parts
-    )
+    seen = dict.fromkeys((n.here.structure.switches[p.switch].element.title, n.kinds[p.switch].role) for p in parts)
     return " and ".join(f"{title}, which {role}" for title, role in seen)
 
 
@@ -76,7 +65,7 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
             "of them, "
             f"or give method='impulse', which puts them side by side"
         )
-    if n.kind[s] == STOP:
+    if n.kinds[s].bounded:
         lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         if not np.isfinite(upper):
             rule = f"at least {value_in_words(lower, unit)}"
@@ -86,7 +75,8 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
             rule = f"within {value_in_words(lower, unit)} and {value_in_words(upper, unit)}"
         said = f"{what} is {value_in_words(n.x[s], unit)} and must be {rule}"
     else:
-        said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must not be negative"
+        rule = "not be negative" if n.kinds[s].forces == ONE_SIDED else "be zero"
+        said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must {rule}"
     return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
@@ -162,34 +152,11 @@ def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstan
 
 
 ENERGY_ROUNDING = 1e-14  # part of the motion's or the impact's energy below which a loss is rounding
-CLOSING_WORDS = {
-    STOP: ("close", "closes"),
-    FRICTION: ("stick", "sticks"),
-    SLIP: ("stick", "sticks"),
-    ONE_WAY: ("lock", "locks"),
-    LOCK: ("lock", ""),
-    RATCHET: ("latch", "latches"),
-    ELASTIC: ("close", "is pressed"),
-}
-OPENING_WORDS = {
-    STOP: ("open", "opens"),
-    FRICTION: ("slip", "slides"),
-    SLIP: ("slip", "slides"),
-    ONE_WAY: ("overrun", "overruns"),
-    LOCK: ("", ""),
-    RATCHET: ("unlatch", "lets go"),
-    ELASTIC: ("open", "lets go"),
-}
-ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
-CONTACT_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
 
 
 def transition_words(n: InstantProblem, s: int, held: bool) -> tuple[str, str]:
     """Return the kind and description of what switch s did."""
-    kind, said = (CLOSING_WORDS if held else OPENING_WORDS).get(int(n.kind[s]), ("", ""))
-    if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
-        return (CONTACT_WORDS if isinstance(n.here.structure.switches[s].element, Touch) else ROPE_WORDS)[kind]
-    return kind, said
+    return n.kinds[s].closing if held else n.kinds[s].opening
 
 
 def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
@@ -202,7 +169,7 @@ def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
         unit = n.units[s]
         goes = "stays" if s in jumped.at_rest else f"leaves at {abs(after):.6g} {unit}/s"
         done.append(
-            f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks"
+            f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if not n.kinds[s].commanded else f"{n.name(s)} locks"
         )
     for s, x in jumped.impulse.items():  # impulses of joints and contact points have components, by their rows
         if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Joint, Touch)):
@@ -231,17 +198,17 @@ def record_mode_changes(
     """
     modes, ways = old
     told: dict[str, list[tuple[int, str]]] = {}
-    for s in range(len(n.kind)):
+    for s in range(len(n.kinds)):
         was, now = modes[s] != OFF, n.W.modes.mode[s] != OFF
         over = n.here.bounces[s].over if s in n.here.bounces else np.nan
         if now and not np.isnan(over):
             count = n.here.bounces.pop(s).count
             told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
             n.over = float(np.fmax(n.over, over))
-        elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
+        elif n.kinds[s].elastic and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
             kind, said = transition_words(n, s, n.ways()[s] != FROZEN)
             told.setdefault(kind, []).append((s, said))
-        elif was != now and s not in hits and not (n.kind[s] == SLIP and _gap_is_open(n, s)):
+        elif was != now and s not in hits and not (n.kinds[s].forces == DISC and _gap_is_open(n, s)):
             kind, said = transition_words(n, s, now)
             if kind:
                 told.setdefault(kind, []).append((s, said))
@@ -254,6 +221,14 @@ def record_mode_changes(
         append_record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
 
 
+def record_initial_breaks(n: InstantProblem) -> None:
+    """Record what cannot hold where the motion starts, and stays open."""
+    for s in n.of(lambda kind: kind.permanent):
+        if n.W.modes.mode[s] == OFF:
+            kind, said = n.kinds[s].opening
+            append_record(n, n.name(s), kind, (said,), None, {}, n.here.y)
+
+
 def _gap_is_open(n: InstantProblem, s: int) -> bool:
     """Return whether the gap of a slip is open: then it does not slide either."""
     return bool(n.W.modes.mode[n.S.switches.other[s]] == OFF)
@@ -261,7 +236,7 @@ def _gap_is_open(n: InstantProblem, s: int) -> bool:
 
 def _slides_either_way(n: InstantProblem, s: int) -> bool:
     """Return whether a switch slides in one of two directions: not a tangent of a spatial contact point."""
-    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switches.partner[s] < 0))
+    return n.kinds[s].kinetic and bool(n.S.switches.partner[s] < 0)
 
 
 def append_record(

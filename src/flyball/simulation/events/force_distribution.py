@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constraints.switch_kinds import FRICTION, SLIP
+from ...constraints.switches.guard_kinds import G_SHARED, OFF
+from ...constraints.switches.switch_kind import DISC, INTERVAL
 from ...engine.guards import GROUP_ROUNDING
 from ...engine.mode_complementarity import FORCES, IMPULSE_STEP
 from ...numerics.complementarity.dense_problem import (
@@ -37,7 +38,6 @@ from ...numerics.complementarity.interior_point import (
     allocate_cone_program,
     largest_margin_kernel,
 )
-from ...tables.table_definitions import G_SHARED, OFF
 from .instant_problem import InstantProblem, ProblemRow
 
 SINGULAR_ROOT = 1e-9  # relative eigenvalue below which one counts as zero
@@ -341,12 +341,12 @@ def sliding_rows(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) ->
                 continue
             for k in own:
                 lean = float(P.u[k]) / speed
-                if n.kind[p.switch] == SLIP:
+                if n.kinds[p.switch].forces == DISC:
                     mu = float(n.S.switch_numbers.kinetic_friction[parts[own[0]].switch])
                     out[k] = parts[k]._replace(rule=SLIDING, lean=lean, gain=mu)
                     P.gain[k, p.of] = (1.0 - FRICTION_REDUCTION) * mu
                 else:
-                    out[k] = parts[k]._replace(rule=SLIDING, way=lean, lean=lean)
+                    out[k] = parts[k].sliding(lean)
         if not out:
             break
     return out
@@ -392,6 +392,6 @@ def write_sharing_group(n: InstantProblem, parts: list[ProblemRow], found: tuple
         for i in rows.tolist():
             s = parts[i].switch
             G.null[j, n.S.switches.row[s]] += B.sign[i] * z[i]
-            if n.kind[s] == FRICTION:
+            if n.kinds[s].forces == INTERVAL:
                 G.bend[j, s] = gain[i] @ z
     G.Q.count[UNKNOWN_COUNT] = Z.shape[1]

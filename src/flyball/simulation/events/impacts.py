@@ -21,7 +21,7 @@ from ...engine.calls import MOTION
 from ...engine.mode_complementarity import SUDDEN_IMPULSES, ModeProblem
 from ...numerics.complementarity.dense_problem import BILATERAL, SOLUTION_FOUND, UNILATERAL, DenseProblem
 from ...tables.table_definitions import BIAS
-from .instant_problem import STOP_KINDS, InstantProblem, ProblemRow
+from .instant_problem import InstantProblem, ProblemRow
 
 REST_RATE = 1e-12  # part of its terms below which a rate after the jump counts as zero
 
@@ -154,7 +154,7 @@ def with_restitution(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return impulses and velocities with restitution added."""
     x, u = hit
-    bounces = [n.kind[p.switch] in STOP_KINDS and p.switch not in n.here.astray for p in parts]
+    bounces = [n.kinds[p.switch].keeps_bounds and p.switch not in n.here.astray for p in parts]
     bounce = np.where(bounces, n.S.switch_numbers.restitution[[p.switch for p in parts]], 0.0)
     least = np.where((P.rule == UNILATERAL) & (x > 0.0), bounce * x, 0.0)
     if not least.any():
@@ -227,7 +227,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
     """Return the switches whose next flights are negligible, (ns,); modes are written, and rates are those at
     take-off.
     """
-    over = np.zeros(len(n.kind), bool)
+    over = np.zeros(len(n.kinds), bool)
     leaving = [s for s, side in at.items() if not still[s] and len(side) == 1]
     if not leaving:
         return over

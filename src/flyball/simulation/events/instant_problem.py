@@ -10,13 +10,26 @@ SLIDING.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...compiler.kernels import BoundKernel, StructBuffer
-from ...constraints.switch_kinds import EDGE, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STATIC, STOP
+from ...constraints.switches.contact_slip import EDGE
+from ...constraints.switches.guard_kinds import (
+    G_BACK,
+    G_CONE,
+    G_LOWER,
+    G_REVERSES,
+    G_SHARED,
+    G_SLIDES,
+    G_TURNS,
+    G_UPPER,
+    HELD,
+    OFF,
+)
+from ...constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW, NOT_IN_USE, ProblemRow, SwitchKind
 from ...engine.calls import ARRIVE, GUARD_VALUES, MOTION, SOLVE, OutputBuffer
 from ...engine.entry_point import engine
 from ...engine.guards import margin_kernel
@@ -39,57 +52,25 @@ from ...numerics.complementarity.dense_problem import (
     FRICTION_DISC,
     FRICTION_DISC_2,
     FRICTION_LINE,
-    NO_IMPULSE,
     SLIDING,
-    UNILATERAL,
     DenseProblem,
     allocate_dense,
 )
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
-from ...tables.table_definitions import (
-    BIAS,
-    G_BACK,
-    G_CONE,
-    G_LOWER,
-    G_SHARED,
-    G_SLIDES,
-    G_TURNS,
-    G_UPPER,
-    HELD,
-    OFF,
-    VALUE,
-)
+from ...tables.table_definitions import BIAS, VALUE
 from .context import RELEASED, EventContext, switch_scales, switch_units
 
 POSITION_TOLERANCE = 1e-10  # distance at which a bound is reached, relative to the mechanism's length or a radian
 RATE_TOLERANCE = (
     1e-12  # rate that counts as zero, relative to the mechanism's length (or a radian) times `reference_rate`
 )
-RELEASED_KIND = -1  # kind of a released switch, which takes no part
 IMMOVABLE_MOBILITY = (
     1e-10  # mobility, relative to that of the total mass, below which only drivers move it; rounding leaves 1e-11
 )
-STOP_KINDS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 REST_ACCELERATION = 1e-9  # negligible acceleration of an immovable row, relative to the reference acceleration
 FAINT_ACCELERATION = 1e-5  # part of that which is negligible for any row
 POSITION_ROUNDING = 2e-15  # rounding of positions, relative to the mechanism's length or a radian
-DECIDED_KINDS = (*STOP_KINDS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes the complementarity problem decides
-
-
-class ProblemRow(NamedTuple):
-    """A row of the complementarity problem."""
-
-    switch: int
-    rule: int
-    sign: float = 1.0
-    way: float = 0.0  # direction (or STATIC) of the friction law; 0: the limit is const + gain on row ``of``
-    rate: float = 0.0
-    lean: float = 0.0
-    const: float = 0.0
-    gain: float = 0.0
-    of: int = -1
-    state: int = NO_IMPULSE
 
 
 class ProblemWorkspace(NamedTuple):
@@ -161,9 +142,12 @@ class InstantProblem:
     def begin(self) -> None:
         """Prepare for another instant, where other elements may have been released."""
         self.over = np.nan
-        self.kind = np.where(self.W.modes.released == RELEASED, RELEASED_KIND, self.S.switches.kind)
-        self.kinds = self.kind.tolist()
-        self.decided = [s for s in self.of(*DECIDED_KINDS) if self.m[s] >= 0]
+        released = self.W.modes.released == RELEASED
+        self.kinds: list[SwitchKind] = [
+            NOT_IN_USE if gone else x.switch.kind
+            for x, gone in zip(self.here.structure.switches, released.tolist(), strict=True)
+        ]
+        self.decided = [s for s in self.of(lambda kind: kind.forces != NO_ROW) if self.m[s] >= 0]
 
     def _acceleration_rounding(self) -> np.ndarray:
         """Return how the rounding of positions changes the accelerations of switches' quantities, (ns,).
@@ -189,9 +173,9 @@ class InstantProblem:
         self.run_engine(MOTION)
         return out
 
-    def of(self, *kinds: int) -> list[int]:
-        """Return the switches of these kinds."""
-        return [s for s, kind in enumerate(self.kinds) if kind in kinds]
+    def of(self, chosen: Callable[[SwitchKind], bool]) -> list[int]:
+        """Return the switches of the chosen kinds."""
+        return [s for s, kind in enumerate(self.kinds) if chosen(kind)]
 
     def fired(self, guards: Iterable[int], *kinds: int) -> set[int]:
         """Return the switches of the guards that are of these kinds."""
@@ -243,9 +227,19 @@ class InstantProblem:
         alone.
         """
         ways, own = self.ways(), {p.switch for p in parts}
-        for s in self.of(FRICTION):
-            loaded = self.S.forces.load[self.force[s]] >= 0
-            ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
+        for s in self.of(lambda kind: kind.forces == INTERVAL):
+            ways[s] = 0.0 if s in own or self.is_loaded(s) else np.sign(self.rate[s])
+
+    def is_loaded(self, s: int) -> bool:
+        """Return whether the force of switch s depends on a load."""
+        return bool(self.force[s] >= 0 and self.S.forces.load[self.force[s]] >= 0)
+
+    def acceleration(self, s: int) -> float:
+        """Return the second derivative of a quantity with the present modes."""
+        self.run_engine(MOTION)
+        nq = self.S.sizes.coordinates
+        vdot = self.desk.K[0, nq : nq + self.here.structure.nv]
+        return float(self.gradients(np.array([s]))[0] @ vdot + self.W.sensed[BIAS, self.m[s]])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return accelerations, multipliers and driver efforts due to a generalised force at the state last
@@ -350,21 +344,26 @@ SLIP_SPEED_SHARE = 0.9  # part of the speed from which on the velocity alone giv
 SLOW_SLIP = 1e3  # speed, in tolerances of rates, below which a spatial slip ends where its guard triggered
 
 
+def slips_of(n: InstantProblem) -> list[int]:
+    """Return the slips of all contact points."""
+    return n.of(lambda kind: kind.forces == DISC)
+
+
 def slips_at_gap(n: InstantProblem, gap: int) -> list[int]:
     """Return the slips of a gap's contact point: none, one, or two in a row."""
-    return [s for s in n.of(SLIP) if n.S.switches.other[s] == gap]
+    return [s for s in slips_of(n) if n.S.switches.other[s] == gap]
 
 
 def gaps_beyond_edges(n: InstantProblem) -> set[int]:
     """Return the gaps of corners that leave their face: at its edge and moving outwards."""
     leaving = (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
-    return {int(n.S.switches.other[s]) for s in n.of(EDGE) if leaving[s]}
+    return {int(n.S.switches.other[s]) for s in n.of(lambda kind: kind is EDGE) if leaving[s]}
 
 
 def mark_ended_slips(n: InstantProblem, fired: np.ndarray, still: np.ndarray) -> None:
     """Mark in ``still`` which slips have ended; of a pair both or none."""
     done = n.fired(fired, G_TURNS)
-    for s in n.of(SLIP):
+    for s in slips_of(n):
         other = int(n.S.switches.partner[s])
         if other < 0:
             still[s] |= s in done
@@ -384,11 +383,16 @@ def stop_slips(n: InstantProblem, fired: np.ndarray) -> None:
     for s in sorted(n.fired(fired, G_TURNS)):
         pair = [s, int(n.S.switches.partner[s])]
         speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
-        if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW_SLIP * still and not _slip_continues(n, pair):
+        if (
+            n.kinds[s].forces == DISC
+            and pair[1] >= 0
+            and still < speed <= SLOW_SLIP * still
+            and not _slip_continues(n, pair)
+        ):
             over += pair
     if not over:
         return
-    gaps = np.flatnonzero((n.kind == STOP) & (n.mode != OFF)).tolist()
+    gaps = [s for s in n.of(lambda kind: kind.keeps_bounds) if n.mode[s] != OFF]
     B, P, _ = n.problem([ProblemRow(s, BILATERAL) for s in (*over, *gaps)])
     rates = np.zeros(len(B.which))
     rates[: len(over)] = n.rate[over]
@@ -439,7 +443,12 @@ def use_kinetic_friction(n: InstantProblem, parts: Sequence[ProblemRow], P: Dens
     """
     other = False
     for i, p in enumerate(parts):
-        if n.kind[p.switch] == SLIP and P.rule[i] != FRICTION_DISC_2 and P.state[i] != AT_REST and not resting[i]:
+        if (
+            n.kinds[p.switch].forces == DISC
+            and P.rule[i] != FRICTION_DISC_2
+            and P.state[i] != AT_REST
+            and not resting[i]
+        ):
             mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
             other |= P.gain[i, p.of] != mu
             P.gain[i, p.of] = mu
@@ -461,7 +470,7 @@ def sliding_at_cone(
         if (
             p.switch not in ends
             or p.rule not in (FRICTION_LINE, FRICTION_DISC)
-            or n.kind[p.switch] != SLIP
+            or n.kinds[p.switch].forces != DISC
             or state[i] != AT_REST
         ):
             continue
@@ -480,10 +489,10 @@ def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.
     """
     state, x, u, lean = found
     W, ways = n.W, n.ways()
-    slips = n.of(SLIP)
+    slips = slips_of(n)
     W.modes.mode[slips], W.modes.hold[slips] = OFF, 0.0
     for i, p in enumerate(parts):
-        own = slips_at_gap(n, int(n.S.switches.other[p.switch])) if n.kind[p.switch] == SLIP else [-1]
+        own = slips_at_gap(n, int(n.S.switches.other[p.switch])) if n.kinds[p.switch].forces == DISC else [-1]
         if p.switch != own[0] or state[p.of] != AT_REST:
             continue
         rows = np.arange(i, i + len(own))
@@ -514,7 +523,7 @@ def closed_bounds(n: InstantProblem, fired: np.ndarray) -> dict[int, tuple[float
     hit = {(s, SIDE_OF_GUARD[k]) for k, s, _ in (n.guarded[g] for g in fired) if k in SIDE_OF_GUARD}
     out = {}
     gone = gaps_beyond_edges(n)
-    for s in n.of(*STOP_KINDS):
+    for s in n.of(lambda kind: kind.keeps_bounds):
         if s in gone:
             continue
         gaps = {1.0: n.x[s] - n.W.modes.lower[s], -1.0: n.W.modes.upper[s] - n.x[s]}
@@ -528,34 +537,19 @@ def closed_bounds(n: InstantProblem, fired: np.ndarray) -> dict[int, tuple[float
 def switches_at_rest(n: InstantProblem, fired: np.ndarray) -> np.ndarray:
     """Return whether the rate of each switch counts as zero, (ns,)."""
     still = np.abs(n.rate) <= n.still
-    still[list(n.fired(fired, G_SLIDES, G_BACK))] = True
+    still[list(n.fired(fired, G_SLIDES, G_REVERSES, G_BACK))] = True
     mark_ended_slips(n, fired, still)
     return still
 
 
 def rows_of_velocities(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[ProblemRow]:
     """Return the rows along which impulses may act."""
-    out = []
+    out: list[ProblemRow] = []
     for s, kind in enumerate(n.kinds):
-        if kind in STOP_KINDS and s in at:
-            out += _stop_rows(s, at[s])
+        own = kind.velocity_rows(n, s, at.get(s, ()), bool(still[s]))
+        out += own
+        if own and kind.keeps_bounds:
             out += slip_rows(n, s, len(out) - 1, still, known_direction=False)
-        elif kind == ONE_WAY:
-            out.append(ProblemRow(s, UNILATERAL, state=AT_REST))
-        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
-            out.append(ProblemRow(s, BILATERAL))
-        elif kind == FRICTION and n.S.forces.load[n.force[s]] >= 0:
-            held = bool(still[s]) or n.mode[s] != OFF
-            out.append(
-                ProblemRow(
-                    s,
-                    FRICTION_LINE,
-                    1.0,
-                    STATIC if held else _sign_of(n.rate[s]),
-                    0.0 if held else n.rate[s],
-                    state=AT_REST,
-                )
-            )
     return out
 
 
@@ -563,28 +557,10 @@ def rows_of_accelerations(n: InstantProblem, at: dict[int, tuple[float, ...]], s
     """Return the rows along which forces may act; of separating or sliding ones only friction that depends on its
     load.
     """
-    out = []
+    out: list[ProblemRow] = []
     for s, kind in enumerate(n.kinds):
-        if kind in STOP_KINDS and s in at and still[s]:
-            out += _stop_rows(s, at[s], AT_REST if n.mode[s] != OFF else NO_IMPULSE)
+        own = kind.acceleration_rows(n, s, at.get(s, ()), bool(still[s]))
+        out += own
+        if own and kind.keeps_bounds:
             out += slip_rows(n, s, len(out) - 1, still, known_direction=True)
-        elif kind == ONE_WAY and still[s]:
-            out.append(ProblemRow(s, UNILATERAL, state=AT_REST if n.mode[s] != OFF else NO_IMPULSE))
-        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
-            out.append(ProblemRow(s, BILATERAL))
-        elif kind == FRICTION:
-            if still[s]:
-                out.append(ProblemRow(s, FRICTION_LINE, way=STATIC, state=AT_REST))
-            elif n.S.forces.load[n.force[s]] >= 0:
-                sign = _sign_of(n.rate[s])
-                out.append(ProblemRow(s, SLIDING, way=sign, rate=float(n.rate[s]), lean=sign))
     return out
-
-
-def _stop_rows(s: int, at: tuple[float, ...], state: int = AT_REST) -> list[ProblemRow]:
-    """Return the row of a stop; a stop at both bounds is bilateral."""
-    return [ProblemRow(s, BILATERAL)] if len(at) > 1 else [ProblemRow(s, UNILATERAL, at[0], state=state)]
-
-
-def _sign_of(x: float) -> float:
-    return 1.0 if x > 0.0 else -1.0

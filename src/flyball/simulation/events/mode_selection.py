@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...constraints.switch_kinds import BY_RATE, FRICTION, ONE_WAY, RATCHET, STOP
+from ...constraints.switches.guard_kinds import FORCE_GUARDS, G_BACK, G_HOLDS, G_LOWER, G_PULL, G_UPPER, HELD, OFF
+from ...constraints.switches.switch_kind import INTERVAL, NO_ROW, ONE_SIDED, ProblemRow
 from ...engine.calls import MOTION
 from ...engine.integration_loop import GuardedLoop
 from ...engine.loads import SLOPES_UNKNOWN
@@ -25,15 +26,12 @@ from ...numerics.complementarity.dense_problem import (
     UNILATERAL,
 )
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import G_BACK, G_CONE, G_HOLDS, G_LOWER, G_PULL, G_UPPER, HELD, LOAD, OFF
-from .context import EventContext
+from ...tables.table_definitions import LOAD
+from .context import RELEASED, EventContext
 from .force_distribution import held_at_rest, released_by_group, sliding_without_solution, write_sharing_group
 from .instant_problem import (
-    DECIDED_KINDS,
     IMMOVABLE_MOBILITY,
-    STOP_KINDS,
     InstantProblem,
-    ProblemRow,
     instant_problem,
     reference_rate,
     rows_of_accelerations,
@@ -47,8 +45,6 @@ CLEAR_FORCE = 10.0  # factor of rounding above which a force is clearly nonzero
 LOOKAHEAD_FACTORS = (1.0, 1e2, 1e4)  # later times that are tried, relative to the first
 LOOKAHEAD_OF_STEP, LOOKAHEAD_OF_SPAN = 1e-6, 1e-9  # first lookahead, relative to the last step, or to the duration
 DEPENDENT_ROW = 1e-11  # part of a row's own response below which it depends on other rows
-ONE_SIDED_KINDS = (STOP, RATCHET, ONE_WAY)
-FORCE_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of the forces of active rows
 
 
 def weakly_active(n: InstantProblem, found: ModeDecision) -> list[int]:
@@ -58,7 +54,7 @@ def weakly_active(n: InstantProblem, found: ModeDecision) -> list[int]:
         i
         for i, p in enumerate(found.parts)
         if p.rule in (UNILATERAL, INACTIVE)
-        and n.kind[p.switch] in ONE_SIDED_KINDS
+        and n.kinds[p.switch].forces == ONE_SIDED
         and found.state[i] != AT_REST
         and i not in led
         and found.A[i, i] > 0.0
@@ -114,7 +110,7 @@ def rows_tied_to_bound(n: InstantProblem, found: ModeDecision) -> frozenset[tupl
         c = np.linalg.lstsq(A, found.A[held, i], rcond=1e-12)[0]
         rest = found.A[i, i] - c @ found.A[held, i]
         if abs(rest) <= DEPENDENT_ROW * found.A[i, i] and not _moved_by_drivers(n, room.B, i, (held, c)):
-            out.add((G_BACK if n.kind[p.switch] == ONE_WAY else G_LOWER if p.sign > 0.0 else G_UPPER, p.switch))
+            out.add((G_BACK if not n.kinds[p.switch].bounded else G_LOWER if p.sign > 0.0 else G_UPPER, p.switch))
     return frozenset(out)
 
 
@@ -231,8 +227,7 @@ def _released_row(p: ProblemRow, x: float) -> ProblemRow:
     """Return the row as it is after its release."""
     if p.rule == UNILATERAL:
         return p._replace(rule=INACTIVE)
-    way = -1.0 if x > 0.0 else 1.0
-    return p._replace(rule=SLIDING, way=way, lean=way)
+    return p.sliding(-1.0 if x > 0.0 else 1.0)
 
 
 def solve_rows(n: InstantProblem, parts: list[ProblemRow], *, all_hold: bool = False) -> ModeDecision:
@@ -262,6 +257,7 @@ def solve_rows(n: InstantProblem, parts: list[ProblemRow], *, all_hold: bool = F
         for i in slips:
             P.rule[i], P.lean[i] = SLIDING, 1.0 if P.state[i] == AT_LOW else -1.0
             B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
+            P.const[i] = 0.0 if n.kinds[parts[i].switch].permanent else P.const[i]
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     rounding = P.grain * np.minimum(1.0 / np.maximum(P.A.diagonal(), 1e-300), n.inertia[B.which])
@@ -293,21 +289,21 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
     """Write modes, switch states and held values into the motion."""
     W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kinds):
-        if kind in DECIDED_KINDS and n.m[s] >= 0:
+        if kind.forces != NO_ROW and n.m[s] >= 0:
             W.modes.mode[s] = OFF
-            ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0
-            if kind == FRICTION and still[s] and s not in taking:
-                ways[s] = BY_RATE
+            ways[s] = kind.direction(n, s, bool(still[s]), s in taking)
     for i, p in enumerate(found.parts):
-        s, kind = p.switch, n.kind[p.switch]
+        s, kind = p.switch, n.kinds[p.switch]
         if found.state[i] == AT_REST:
             W.modes.mode[s] = HELD
             W.modes.hold[s] = n.hold[s] if n.mode[s] == HELD else n.x[s]
-            if kind in STOP_KINDS:
+            if kind.keeps_bounds:
                 W.modes.hold[s] = (W.modes.lower if p.sign > 0.0 else W.modes.upper)[s]
             ways[s] = p.sign if p.rule == UNILATERAL else 0.0
-        elif kind == FRICTION:
+        elif kind.forces == INTERVAL:
             ways[s] = found.lean[i]
+    for s in n.of(lambda kind: kind.permanent):
+        W.modes.released[s] = RELEASED if W.modes.mode[s] == OFF else 0.0
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     write_sharing_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):

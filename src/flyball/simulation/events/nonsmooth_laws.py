@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constraints.switch_kinds import BRANCH
+from ...constraints.switches.guard_kinds import G_CORNER, HELD, OFF, STEADY
 from ...engine.calls import MOTION
 from ...engine.guards import corner_value
 from ...engine.mode_complementarity import RATE_ROUNDING, VELOCITY_ROUNDING
@@ -24,7 +24,7 @@ from ...engine.rows import count_measured
 from ...errors import SimulationError
 from ...laws.bytecode import BY_MOTION, BY_TIME, evaluate_jet
 from ...results.events import EventRecord
-from ...tables.table_definitions import G_CORNER, HELD, OFF, STEADY, VALUE
+from ...tables.table_definitions import VALUE
 from .impacts import LOW_FLIGHT
 from .instant_problem import RATE_TOLERANCE, InstantProblem
 
@@ -170,7 +170,7 @@ class Corners:
 
     def __init__(self, n: InstantProblem) -> None:
         self.n = n
-        self.all = np.array(n.of(BRANCH), np.int64)
+        self.all = np.flatnonzero(n.S.switches.law >= 0)
         self.at: set[int] = set()
         self.old = n.W.modes.mode.copy()
         self.sides = n.ways().copy()

@@ -8,30 +8,28 @@ time step that tends to zero (Stewart 2000, SIAM Review 42).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...constraints.switch_kinds import ELASTIC, FROZEN, ONE_WAY, RATCHET, SLIP, STOP, TURN
-from ...engine.calls import MOTION
-from ...engine.mode_complementarity import STEP_IMPULSES, SUDDEN_IMPULSES, TERM_ROUNDING
-from ...model.contact_point import Touch
-from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, NO_IMPULSE, NO_SOLUTION, SOLUTION_FOUND
-from ...tables.table_definitions import (
-    BIAS,
-    G_BACK,
-    G_CONE,
+from ...constraints.switches.elastic_stop import pressed_side
+from ...constraints.switches.guard_kinds import (
+    FORCE_GUARDS,
+    FROZEN,
     G_CORNER,
-    G_HOLDS,
-    G_PRESS_LOWER,
-    G_PRESS_UPPER,
-    G_PULL,
+    G_REVERSES,
     G_SHARED,
     G_SLIDES,
     G_TURNS,
     HELD,
     OFF,
+    PRESS_GUARDS,
+    RATE_GUARDS,
 )
+from ...constraints.switches.switch_kind import DISC
+from ...engine.mode_complementarity import STEP_IMPULSES, SUDDEN_IMPULSES, TERM_ROUNDING
+from ...model.contact_point import Touch
+from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, NO_IMPULSE, NO_SOLUTION, SOLUTION_FOUND
 from ..diagnosis import body_names
 from .context import EventContext
 from .event_actions import perform_actions, perform_initial_actions
@@ -41,6 +39,7 @@ from .event_messages import (
     no_admissible_forces,
     no_admissible_impulses,
     passed_bound,
+    record_initial_breaks,
     record_jump,
     record_mode_changes,
     start_beyond_bound,
@@ -67,93 +66,15 @@ from .instant_problem import (
 from .mode_selection import ModeDecision, decide_modes, element_titles, remove_residual_rates
 from .nonsmooth_laws import Corners
 
-SLOW_ACCELERATION = 1e-9  # negligible acceleration, relative to length (or a radian) times the squared rate
-TOOTH_TOLERANCE = 1e-9  # part of the pitch within which a tooth is reached
-UNDECIDED_SIDE = 0.0  # state of an elastic switch whose force follows from its position
-
-
-def update_ratchets(n: InstantProblem, still: np.ndarray) -> None:
-    """Update ratchets that do not hold: moving forwards, or back to the last passed tooth; ``still``: switches at
-    rest.
-    """
-    for s in n.of(RATCHET):
-        first, n.W.modes.upper[s] = n.W.modes.upper[s] < np.inf, np.inf
-        if n.mode[s] != OFF:
-            n.W.modes.lower[s] = n.hold[s]  # for continued motions too
-        elif n.rate[s] > 0.0 and not still[s]:
-            _move_freely(n, s)
-        elif first or n.way[s] >= 0.0:
-            tooth, pitch = n.S.switch_numbers.tooth[s], n.S.switch_numbers.pitch[s]
-            n.W.modes.lower[s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH_TOLERANCE)
-            n.ways()[s] = n.way[s] = -1.0
-
-
-def release_ratchets(n: InstantProblem, hit: Collection[int]) -> None:
-    """Set ratchets free whose tooth opened or rebounded from an impact (``hit``), and those that begin to move.
-
-    The modes are decided already.
-    """
-    for s in n.of(RATCHET):
-        if n.W.modes.mode[s] != OFF:
-            continue
-        slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s] * n.characteristic_rate
-        if (
-            n.mode[s] != OFF
-            or s in hit
-            or (slow and _switch_acceleration(n, s) > SLOW_ACCELERATION * n.unit[s] * n.characteristic_rate**2)
-        ):
-            _move_freely(n, s)
-        else:
-            n.ways()[s] = n.way[s]
-
-
-def _move_freely(n: InstantProblem, s: int) -> None:
-    """Remove the bound of a ratchet until it reverses."""
-    n.ways()[s] = n.way[s] = 1.0
-    n.W.modes.lower[s] = -np.inf
-
-
-def _switch_acceleration(n: InstantProblem, s: int) -> float:
-    """Return the second derivative of a quantity with the present modes."""
-    n.run_engine(MOTION)
-    nq = n.S.sizes.coordinates
-    vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
-    return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
-
 
 def update_elastic_stops(n: InstantProblem, fired: np.ndarray, previous: np.ndarray) -> None:
     """Set which sides of elastic stops are pressed; ``n`` is evaluated there.
 
     A side whose guard triggered is pressed if it was open according to ``previous``, and open if it was pressed.
     """
-    for s in n.of(ELASTIC):
-        hit = {k for k, of, _ in (n.guarded[g] for g in fired) if of == s}
-        n.ways()[s] = FROZEN + _pressed_side(n, s, float(previous[s]) - FROZEN, hit)
-
-
-def _pressed_side(n: InstantProblem, s: int, old: float, hit: set[int]) -> float:
-    """Return 1 if the lower side is pressed, -1: the upper, 0: none; `UNDECIDED_SIDE` less `FROZEN` if undecided."""
-    k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
-    now = 0.0
-    bounds = n.W.modes.lower, n.W.modes.upper
-    for side, bound, guard in zip((1.0, -1.0), bounds, (G_PRESS_LOWER, G_PRESS_UPPER), strict=True):
-        depth, rate = side * (bound[s] - n.x[s]), -side * n.rate[s]
-        if not np.isfinite(depth):
-            continue
-        if guard in hit:
-            on = old != side
-        elif abs(depth) > n.near[s]:
-            on = depth > 0.0 and k * depth + c * rate > 0.0
-        elif abs(rate) > n.still[s]:
-            on = rate > 0.0
-        else:
-            n.ways()[s] = FROZEN
-            rise = -side * _switch_acceleration(n, s)
-            if abs(rise) <= SLOW_ACCELERATION * n.unit[s] * n.characteristic_rate**2:
-                return UNDECIDED_SIDE - FROZEN
-            on = rise > 0.0
-        now = side if on else now
-    return now
+    for s in n.of(lambda kind: kind.elastic):
+        triggered = {k for k, of, _ in (n.guarded[g] for g in fired) if of == s}
+        n.ways()[s] = FROZEN + pressed_side(n, s, float(previous[s]) - FROZEN, triggered)
 
 
 DIFFERENT_SOLUTION = 1e-6  # relative difference of accelerations of another solution
@@ -232,7 +153,7 @@ def _undetermined_friction(n: InstantProblem, found: ModeDecision) -> str:
 
 def _friction_is_needless(n: InstantProblem, found: ModeDecision, rows: list[int]) -> bool:
     """Return whether these are contact points that stay at rest without friction too, as a ball in a groove."""
-    if any(n.kind[found.parts[i].switch] != SLIP for i in rows):
+    if any(n.kinds[found.parts[i].switch].forces != DISC for i in rows):
         return False
     P = n.workspaces[len(found.parts)].P
     P.const[rows], P.gain[rows], P.state[:] = 0.0, 0.0, found.state
@@ -270,8 +191,6 @@ def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: flo
 
 MOST_ROUNDS = 100
 MOST_REPEATS = 5  # repeated decisions of sliding directions for the same modes
-RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards that depend on rates
-HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of active rows, by the forces that they carry
 BROKEN_FORCE = 1e-8  # part of its terms beyond which a force violates its bound
 VIOLATED_START = 1e-9  # violation that is refused at the start, relative to length or a radian (rates: times the rate)
 PENETRATED = 1e-7  # penetration of an open stop that is refused, relative to the same
@@ -298,6 +217,7 @@ def resolve_start(here: EventContext) -> None:
         remove_slight_overlaps(n)
         refuse_violated(n)
         resolve_jumps_and_corners(n, corners, np.zeros(0, np.int64), record=False)
+        record_initial_breaks(n)
     acts.told(["start"])
     _resolve_chain(here, acts.passed())
 
@@ -341,7 +261,7 @@ def resolve_jumps_and_corners(n: InstantProblem, corners: Corners, fired: np.nda
     by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
     if not len(fired) or by_rows:
         resolve_modes(n, np.array(by_rows, np.int64), record)
-    let_go = np.array([g for g in by_rows if n.guarded[g][0] in HOLDING_GUARDS], np.int64)
+    let_go = np.array([g for g in by_rows if n.guarded[g][0] in FORCE_GUARDS], np.int64)
     for _ in range(MOST_ROUNDS):
         if not corners.settle() or not n.decided:
             return
@@ -352,17 +272,14 @@ def resolve_jumps_and_corners(n: InstantProblem, corners: Corners, fired: np.nda
 def refuse_violated(n: InstantProblem) -> None:
     """Refuse a start beyond a limit."""
     for s, kind in enumerate(n.kinds):
-        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
-        back = -n.rate[s] / n.characteristic_rate if kind == ONE_WAY else 0.0
-        past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else back
-        if past > VIOLATED_START * n.unit[s]:
+        if kind.start_violation(n, s) > VIOLATED_START * n.unit[s]:
             raise start_beyond_bound(n, s)
 
 
 def refuse_penetration(n: InstantProblem) -> None:
     """Refuse to continue where an open stop or contact is past its bound by more than a closed one may be."""
-    for s in n.of(STOP):
-        past = max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s])
+    for s, kind in enumerate(n.kinds):
+        past = kind.penetration(n, s)
         if n.mode[s] == OFF and past > PENETRATED * n.unit[s] + n.W.options.position_tolerance:
             raise passed_bound(n, s, past)
 
@@ -382,7 +299,8 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
         stop_slips(n, fired)
         still = switches_at_rest(n, fired)
         still[calm] = True
-        update_ratchets(n, still)
+        for s, kind in enumerate(n.kinds):
+            kind.prepare(n, s, bool(still[s]))
         at = closed_bounds(n, fired)
         rate = n.rate.copy()
         jumped = jump_if_needed(n, at, still)
@@ -401,7 +319,8 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
             n.reevaluate_switches()
             fired, calm = guards_still_valid(n, fired, rate), list(found.at_rest)
             continue
-        release_ratchets(n, hits)
+        for s, kind in enumerate(n.kinds):
+            kind.finish(n, s, hits)
         remove_residual_rates(n, found)
         n.project()
         if jumped is not None and (
@@ -428,7 +347,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
 
 def slides_against_direction(n: InstantProblem, guards: np.ndarray) -> bool:
     """Return whether a row slides against its direction: the end of a series of bounces also changes other rates."""
-    sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_TURNS))
+    sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_REVERSES, G_TURNS))
     return any(guards[g] < -n.still[s] for g, s in sliding)
 
 
@@ -436,7 +355,12 @@ def guards_still_valid(n: InstantProblem, fired: np.ndarray, rate: np.ndarray) -
     """Return the triggered guards without guards of rates that a jump has changed."""
     other = np.abs(n.rate - rate) > n.still
     return np.array(
-        [g for g in fired.tolist() if n.guarded[g][0] not in RATE_GUARDS or not other[n.guarded[g][1]]], np.int64
+        [
+            g
+            for g in fired.tolist()
+            if n.guarded[g][0] not in (*RATE_GUARDS, *PRESS_GUARDS) or not other[n.guarded[g][1]]
+        ],
+        np.int64,
     )
 
 
@@ -491,7 +415,7 @@ def broken_guards(n: InstantProblem, found: ModeDecision, guards: np.ndarray) ->
     out = [
         k
         for k, (kind, s, _) in enumerate(n.guarded)
-        if kind in HOLDING_GUARDS and s in found.sizes and guards[k] < -BROKEN_FORCE * found.sizes[s] - found.least[s]
+        if kind in FORCE_GUARDS and s in found.sizes and guards[k] < -BROKEN_FORCE * found.sizes[s] - found.least[s]
     ]
     last = len(guards) - 1
     if n.shares and guards[last] < -BROKEN_FORCE * n.here.group.size[0]:
@@ -509,7 +433,9 @@ REPORTED_OVERLAP = 1e-7  # overlap that is reported, relative to the same
 def remove_slight_overlaps(n: InstantProblem) -> None:
     """Remove overlaps up to `SLIGHT_OVERLAP` of contacts, stops and ropes; velocities are unchanged."""
     over = {}
-    for s in np.flatnonzero(n.kind == STOP).tolist():
+    for s, kind in enumerate(n.kinds):
+        if not kind.penetration(n, s) > n.near[s]:
+            continue
         lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         for side, depth in ((lower, lower - n.x[s]), (upper, n.x[s] - upper)):
             if n.near[s] < depth <= SLIGHT_OVERLAP * n.unit[s]:

@@ -1,0 +1,14 @@
+"""Tangents of a contact point that stick or slide, and the distance of the point from the end of its face."""
+
+from __future__ import annotations
+
+from .guard_kinds import G_CONE, G_EDGE, G_TURNS
+from .switch_kind import DISC, SwitchKind
+
+SLIP = SwitchKind(
+    guards=(G_CONE, G_TURNS), forces=DISC, kinetic=True, numbers=("static_friction", "kinetic_friction"),
+    role="has friction", closing=("stick", "sticks"), opening=("slip", "slides"),
+)  # fmt: skip
+"""A tangent that sticks or slides while the gap of its contact point is closed."""
+EDGE = SwitchKind(guards=(G_EDGE,), numbers=())
+"""The distance of a contact point from the end of its face, without a row."""
