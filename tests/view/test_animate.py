@@ -240,7 +240,7 @@ def test_holes_are_drawn_as_holes() -> None:
 
 
 def test_a_joint_that_nobody_can_draw_gets_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fb.Spherical, "drawn", "strange")
+    monkeypatch.setattr(fb.Spherical, "symbol", "strange")
     m = fb.Mechanism("m")
     m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), fb.Spherical("J", "ground", "b", at=(1, 2, 3)))
     r = still(m)

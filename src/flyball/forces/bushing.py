@@ -129,7 +129,7 @@ class Bushing(TwoFrameForce):
     wrench: ClassVar = staticmethod(wrench)
     branch: ClassVar = staticmethod(branch)
     energy: ClassVar = staticmethod(energy)
-    drawn: ClassVar[str] = "bushing"
+    symbol: ClassVar[str] = "bushing"
     fails: ClassVar[str] = (
         "It has been turned by half a turn, where it no longer knows its axis; stop before, or use a joint with springs"
     )

@@ -68,7 +68,7 @@ class PointForce(BodyForce):
     kind: ClassVar[int] = KIND
     inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
-    drawn: ClassVar[str] = "arrow"
+    symbol: ClassVar[str] = "arrow"
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
         """Check the number of components; the force needs no frames of its own."""

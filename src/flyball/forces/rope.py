@@ -99,7 +99,7 @@ class Rope(CoordinateForce):
     energy: ClassVar = staticmethod(energy)
     sign: ClassVar[float] = -1.0
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N", "taut": "1"}
-    drawn: ClassVar[str] = "rope"
+    symbol: ClassVar[str] = "rope"
     single: ClassVar[str] = "rope"
     fails: ClassVar[str] = "Two neighbouring points of it coincide, where the rope between them has no direction"
 

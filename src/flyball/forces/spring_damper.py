@@ -83,7 +83,7 @@ class SpringDamper(TwoPointForce):
     wrench: ClassVar = staticmethod(wrench)
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "force": "N"}
-    drawn: ClassVar[str] = "spring"
+    symbol: ClassVar[str] = "spring"
     fails: ClassVar[str] = (
         "Its two points coincide, where a force along the line between them has no direction, unless length is 0 and "
         "there is no force="

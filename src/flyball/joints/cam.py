@@ -82,7 +82,7 @@ class Cam(Joint):
 
     blocks: ClassVar = (CURVE,)
     needs_axis: ClassVar[bool] = True
-    drawn: ClassVar[str] = "cam"
+    symbol: ClassVar[str] = "cam"
     one_sided: ClassVar[bool] = True
     both_sides: ClassVar[str] = ", or say groove=True if the follower is held on both sides"
 

@@ -37,7 +37,7 @@ class Cylindrical(Joint):
     chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("R", coordinate="angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
-    drawn: ClassVar[str] = "cylindrical"
+    symbol: ClassVar[str] = "cylindrical"
     one_surface: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 1.0

@@ -34,7 +34,7 @@ class Distance(Joint):
 
     blocks: ClassVar = CONSTANT_DISTANCE
     axisless: ClassVar[bool] = True
-    drawn: ClassVar[str] = "link"
+    symbol: ClassVar[str] = "link"
 
     def check(self, n: SimpleNamespace) -> None:
         """The length must be greater than zero."""

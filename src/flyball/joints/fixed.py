@@ -24,7 +24,7 @@ class Fixed(Joint):
 
     blocks: ClassVar = COMMON_POINT + SAME_AXES
     chain: ClassVar = ()
-    drawn: ClassVar[str] = "fixed"
+    symbol: ClassVar[str] = "fixed"
     replaceable: ClassVar[bool] = True
     omission: ClassVar[float] = 1.5
 

@@ -41,7 +41,7 @@ class GearPair(Coupling):
     teeth: Annotated[Numbers, Unit(None)]
     internal: Flag = False
 
-    drawn: ClassVar[str] = "gear"
+    symbol: ClassVar[str] = "gear"
     hints: ClassVar[dict[str, str]] = {
         "backlash": "gears with play are a Backlash in its place: Backlash('mesh', ('A.angle', 'B.angle'), "
         "weights=(z1, z2), gap='0.2 deg')"

@@ -50,7 +50,7 @@ class GeneralUniversal(Joint):
     }
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
-    drawn: ClassVar[str] = "universal"
+    symbol: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """The frames at their points: z along the axis, x in the plane of both axes, so that angles start at zero."""

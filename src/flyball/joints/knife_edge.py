@@ -38,7 +38,7 @@ class KnifeEdge(Joint):
     blocks: ClassVar = (no_sideways("x"),)
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
-    drawn: ClassVar[str] = "knife_edge"
+    symbol: ClassVar[str] = "knife_edge"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """Return both frames at the point; z along the edge, y up, x sideways."""

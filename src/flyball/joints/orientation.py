@@ -28,4 +28,4 @@ class Orientation(Joint):
     blocks: ClassVar = SAME_AXES
     coordinates: ClassVar = {a: Coordinate(shift(a)) for a in "xyz"}
     chain: ClassVar = tuple(Primitive("P", a, a) for a in "xyz")
-    drawn: ClassVar[str] = "orientation"
+    symbol: ClassVar[str] = "orientation"

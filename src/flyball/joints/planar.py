@@ -39,6 +39,6 @@ class Planar(Joint):
     chain: ClassVar = (Primitive("P", "x", "x"), Primitive("P", "y", "y"), Primitive("R", "z", "angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
-    drawn: ClassVar[str] = "planar"
+    symbol: ClassVar[str] = "planar"
     one_surface: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True

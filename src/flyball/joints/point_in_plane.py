@@ -31,6 +31,6 @@ class PointInPlane(Joint):
     chain: ClassVar = (Primitive("P", "x", "x"), Primitive("P", "y", "y"), Primitive("S"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
-    drawn: ClassVar[str] = "point_in_plane"
+    symbol: ClassVar[str] = "point_in_plane"
     one_surface: ClassVar[bool] = True
     stand_in: ClassVar[float] = 2.2

@@ -33,7 +33,7 @@ class PointOnLine(Joint):
     chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("S", coordinate="angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
-    drawn: ClassVar[str] = "point_on_line"
+    symbol: ClassVar[str] = "point_on_line"
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 2.1
     called: ClassVar[str] = "a ball in a groove (PointOnLine)"

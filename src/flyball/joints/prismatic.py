@@ -33,7 +33,7 @@ class Prismatic(Joint):
     chain: ClassVar = (Primitive("P", coordinate="displacement"),)
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
-    drawn: ClassVar[str] = "prismatic"
+    symbol: ClassVar[str] = "prismatic"
     replaceable: ClassVar[bool] = True
 
 

@@ -38,7 +38,7 @@ class RackAndPinion(Coupling):
     pinion: str = field(kw_only=False)
     radius: Length
 
-    drawn: ClassVar[str] = "rack"
+    symbol: ClassVar[str] = "rack"
 
     def coupled(self) -> tuple[str, ...]:
         """Return the displacement and the angle."""

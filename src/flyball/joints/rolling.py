@@ -49,7 +49,7 @@ class RollingDisk(Joint):
     blocks: ClassVar = (ON_PLANE, no_slip("x"), no_slip("y"))
     planar_normal: ClassVar[str] = ""
     needs_axis: ClassVar[bool] = True
-    drawn: ClassVar[str] = "rolling"
+    symbol: ClassVar[str] = "rolling"
     one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
@@ -98,7 +98,7 @@ class RollingBall(Joint):
     blocks: ClassVar = (ON_PLANE, no_slip("x"), no_slip("y"))
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
-    drawn: ClassVar[str] = "rolling"
+    symbol: ClassVar[str] = "rolling"
     one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:

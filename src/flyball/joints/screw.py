@@ -46,7 +46,7 @@ class Screw(Joint):
     kept: ClassVar = blocks[-1:]
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
-    drawn: ClassVar[str] = "screw"
+    symbol: ClassVar[str] = "screw"
     thread: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True
 

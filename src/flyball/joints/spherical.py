@@ -25,6 +25,6 @@ class Spherical(Joint):
     blocks: ClassVar = COMMON_POINT
     chain: ClassVar = (Primitive("S"),)
     planar_normal: ClassVar[str] = ""
-    drawn: ClassVar[str] = "spherical"
+    symbol: ClassVar[str] = "spherical"
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 1.0

@@ -47,7 +47,7 @@ class WheelOnLine(Joint):
     planar_normal: ClassVar[str] = "y"
     spatial: ClassVar[bool] = False
     in_space: ClassVar[str] = "RollingDisk, or a RackAndPinion between two joints"
-    drawn: ClassVar[str] = "rolling"
+    symbol: ClassVar[str] = "rolling"
     one_sided: ClassVar[bool] = True
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:

@@ -41,7 +41,7 @@ class Force(Element):
     wrench: ClassVar[Callable]
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
-    drawn: ClassVar[str] = ""
+    symbol: ClassVar[str] = ""
     single: ClassVar[str] = ""  # "rope" or "friction": impulse time stepping treats it as a single row, not as a force
     fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 

@@ -79,7 +79,7 @@ class Joint(Element):
     in_space: ClassVar[str] = "Prismatic"  # replacement for a joint that exists in the plane only
     needs_axis: ClassVar[bool] = False
     axisless: ClassVar[bool] = False  # value for axes that have no name of their own
-    drawn: ClassVar[str] = "fixed"  # symbol in pictures
+    symbol: ClassVar[str] = "fixed"  # symbol in pictures
     replaceable: ClassVar[bool] = False  # whether a joint with fewer constraints may replace it as a remedy
     stand_in: ClassVar[float] = 0.0  # cost of using it as a replacement; 0: it is never proposed
     omission: ClassVar[float] = 3.5  # cost of leaving it out
@@ -209,7 +209,7 @@ class Coupling(Element):
 
     category: ClassVar[str] = "couplings"
     omission: ClassVar[float] = 2.0  # cost of leaving it out as a remedy for redundancy
-    drawn: ClassVar[str] = "coupler"
+    symbol: ClassVar[str] = "coupler"
     dimensions: ClassVar[dict[str, tuple[str, ...]]] = {}  # field -> permitted units
 
     def coupled(self) -> tuple[str, ...]:

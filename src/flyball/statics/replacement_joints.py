@@ -77,7 +77,7 @@ class ContactJoint(Joint):
     radii: tuple[float, float] = (0.0, 0.0)
 
     planar_normal: ClassVar[str] = "y"  # z is the normal of the contact
-    drawn: ClassVar[str] = "point_in_plane"
+    symbol: ClassVar[str] = "point_in_plane"
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
         """World frames F and M of the joint."""
@@ -92,7 +92,7 @@ class CommonPoint(ContactJoint):
     """Sticking contact with a sharp side: a common point."""
 
     blocks: ClassVar = COMMON_POINT
-    drawn: ClassVar[str] = "spherical"
+    symbol: ClassVar[str] = "spherical"
 
 
 @element
@@ -122,7 +122,7 @@ class Rolling(SlidingDisk):
     """Ball or disk M that rolls on the plane z = 0 of F."""
 
     blocks: ClassVar[tuple[Row, ...]] = (ON_PLANE, no_slip("x"), no_slip("y"))
-    drawn: ClassVar[str] = "rolling"
+    symbol: ClassVar[str] = "rolling"
 
 
 @element
@@ -130,7 +130,7 @@ class Centres(ContactJoint):
     """Two balls, or a ball and a corner, that slide on each other: the distance of the centres is constant."""
 
     blocks: ClassVar = CONSTANT_DISTANCE
-    drawn: ClassVar[str] = "link"
+    symbol: ClassVar[str] = "link"
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
         """The distance."""

@@ -226,7 +226,7 @@ def _symbols_and_lines(
             if worn is not None:
                 yield worn
     for e in m.forces:
-        if e.drawn == "bushing":
+        if e.symbol == "bushing":
             yield from (
                 replace(d, scale=1.0) for d in element_symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
             )
@@ -244,7 +244,7 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
         points = [places.track(end)[0] for end in ends]
         return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=_free_length(numbers, points)[every])
     pair = places.ends(e)
-    if pair is None or e.drawn not in ("spring", "damper"):
+    if pair is None or e.symbol not in ("spring", "damper"):
         return None
     kind = "spring" if getattr(numbers, "stiffness", 0.0) != 0.0 else "damper"
     return RecordedLine(e.name, kind, tuple(places.track(end)[0][every] for end in pair))

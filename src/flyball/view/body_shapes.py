@@ -147,17 +147,17 @@ class BodyShapes:
                 self._add(end.body, end.p)
                 k += 1
             return
-        if e.drawn == "prismatic":
+        if e.symbol == "prismatic":
             self._slide(ends)
             return
         guide, runner = ends
-        if e.drawn == "cam" and not guide.grounded:
+        if e.symbol == "cam" and not guide.grounded:
             self.cams[guide.body].append(e)
-        if e.drawn in ("point_on_line", "screw") and not guide.grounded:
+        if e.symbol in ("point_on_line", "screw") and not guide.grounded:
             reach = self.places.reach(guide, runner)
             for d in reach[4:]:
                 self._add(guide.body, guide.p + d * guide.R[:, 2])
-        elif e.drawn not in ("planar", "point_in_plane", "rolling", "cam"):
+        elif e.symbol not in ("planar", "point_in_plane", "rolling", "cam"):
             self._add(guide.body, guide.p)
         self._add(runner.body, runner.p)
 

@@ -215,7 +215,7 @@ def _element_arrows(result: Result, places: AttachedFrames, e: Any) -> Iterator[
     F = places.end(e.name, "F")
     if not M.grounded:
         yield from _force_and_moment(e.name, "element", M, force, torque)
-    if F is not None and not F.grounded and (M.grounded or e.drawn in ("spring", "damper")):
+    if F is not None and not F.grounded and (M.grounded or e.symbol in ("spring", "damper")):
         yield from _force_and_moment(e.name, "element", F, -force, -torque)
 
 

@@ -367,7 +367,7 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
     wheels : list of Wheel
         Gear wheels drawn so far; new ones are added.
     """
-    kind = getattr(e, "drawn", "")
+    kind = getattr(e, "symbol", "")
     if kind == "gear":
         yield from gear_pair(e, places, wheels)
     elif kind == "rack":
