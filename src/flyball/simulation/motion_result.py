@@ -132,7 +132,7 @@ def make_result(
     health = _health(start, clock, o)
     ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE
-    health.watched, health.method = here.watched, here.method
+    health.watched, health.method = here.detection_remark, here.method
     health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
     cuts = list(accumulate((1, s.nq, s.nv, len(s.states), s.nv), initial=0))
@@ -154,8 +154,8 @@ def make_result(
         "doubtful": partial(diagnostics.doubt_messages, result),
     }
     result.events = here.records
-    if here.seen is not None:
-        here.seen.told(result)
+    if here.recorder is not None:
+        here.recorder.told(result)
         result.contacts = event_driven_contacts(result)
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause

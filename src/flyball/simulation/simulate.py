@@ -196,7 +196,7 @@ def integrate_motion(
         elif start.pace is not None:
             here.method = "; ".join(start.pace.told)
     if task == INTEGRATE:
-        here.watched = "; ".join(x for x in (here.watched, remark_on_checked_laws(c, sampled)) if x)
+        here.detection_remark = "; ".join(x for x in (here.detection_remark, remark_on_checked_laws(c, sampled)) if x)
     owed = None
     if task == FOLLOW:
         owed = partial(deferred_works, start, clock, rows)

@@ -438,7 +438,7 @@ class Linearization:
 
     described: Model  # without the inputs
     tree: tuple[str, ...]
-    _asked: Any
+    _operating_point: Any
 
     def linear(
         self,
@@ -480,7 +480,7 @@ class Linearization:
         from .linear.linear_equations import LinearizationOptions, linearize_about
 
         for name in balanced_by:
-            if name in self._asked.inputs:
+            if name in self._operating_point.inputs:
                 raise ModelError(
                     f"balanced_by names {name!r}, an input, which is what is added at the point: let its element "
                     f"have a parameter of its own ({name!r} with torque='tau' or force='F', 'tau' and 'F' among the "
@@ -492,8 +492,8 @@ class Linearization:
         return linearize_about(
             self.described,
             LinearizationOptions(
-                inputs=self._asked.inputs, outputs=outputs, at=at, coordinates="joint" if self.tree else "absolute",
-                independent=independent, balanced_by=balanced_by, parameters=self._asked.parameters, tree=self.tree,
+                inputs=self._operating_point.inputs, outputs=outputs, at=at, coordinates="joint" if self.tree else "absolute",
+                independent=independent, balanced_by=balanced_by, parameters=self._operating_point.parameters, tree=self.tree,
             ),
         )  # fmt: skip
 

@@ -27,7 +27,7 @@ class Friction(SwitchKind):
         if not n.is_loaded(s):
             return []
         sign = sign_of(n.rate[s])
-        return [ProblemRow(s, SLIDING, way=sign, rate=float(n.rate[s]), lean=sign)]
+        return [ProblemRow(s, SLIDING, way=sign, rate=float(n.rate[s]), direction=sign)]
 
     def direction(self, n: Instant, s: int, still: bool, in_problem: bool) -> float:
         """Return the sign of the rate; at rest zero, or `BY_RATE` if no row can hold it."""

@@ -30,7 +30,7 @@ class ProblemRow(NamedTuple):
     sign: float = 1.0
     way: float = 0.0  # direction (or STATIC) of the friction law; 0: the limit is const + gain on row ``of``
     rate: float = 0.0
-    lean: float = 0.0
+    direction: float = 0.0
     const: float = 0.0
     gain: float = 0.0
     of: int = -1
@@ -38,7 +38,7 @@ class ProblemRow(NamedTuple):
 
     def sliding(self, direction: float) -> ProblemRow:
         """Return the row of friction as it slides; a limit that is not a law's holds at rest only."""
-        return self._replace(rule=SLIDING, way=direction if self.way != 0.0 else 0.0, lean=direction, const=0.0)
+        return self._replace(rule=SLIDING, way=direction if self.way != 0.0 else 0.0, direction=direction, const=0.0)
 
 
 class Instant(Protocol):

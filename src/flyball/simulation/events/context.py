@@ -69,7 +69,7 @@ class EventContext:
         Guard -> the rounding of its value at the instant, where that is known.
     zero : dict
         Event -> size of its guard where it last triggered: zero to rounding.
-    sides : dict
+    final_signs : dict
         Event -> the last sign of its guard, where the guard is zero to rounding at the end of the motion.
     fresh : bool
         Whether forces or velocities jump at the instant: the next step is then no wider than recent ones.
@@ -77,11 +77,11 @@ class EventContext:
         Workspace for resolving instants (`events.instant_problem`).
     failed : Exception
         Why the motion cannot continue.
-    watched : str
+    detection_remark : str
         Description of how closely events were detected.
     method : str
         Description of the methods used, where there were several.
-    astray : frozenset of int
+    missed_crossings : frozenset of int
         Switches whose crossing was missed (`event_loop.missed_crossings`): stops left in the wrong direction at
         negligible speed, which close without a bounce, and corners whose laws were on the wrong side.
     sharing : ForceDistribution, optional
@@ -92,7 +92,7 @@ class EventContext:
         Switch -> force that is rounding, for the rows of the last mode decision.
     still : tuple of int
         Measured quantities whose rates active rows keep at zero (`mode_selection.held_rates`).
-    seen : PhaseRecorder, optional
+    recorder : PhaseRecorder, optional
         Modes at the output rows so far (`event_loop.PhaseRecorder`).
     """
 
@@ -104,7 +104,7 @@ class EventContext:
     fresh: bool = False
     instant_problem: Any = None
     failed: Exception | None = None
-    watched: str = ""
+    detection_remark: str = ""
     method: str = ""
     given: float = 0.0
     external_impulse: np.ndarray | None = None
@@ -115,16 +115,16 @@ class EventContext:
     tied: frozenset[tuple[int, int]] = frozenset()
     least: dict[int, float] = field(default_factory=dict)
     still: tuple[int, ...] = ()
-    seen: Any = None
+    recorder: Any = None
     sharing: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     settled_keys: dict[str, Any] = field(default_factory=dict)
     settled_at: float = float("nan")
-    astray: frozenset[int] = frozenset()
+    missed_crossings: frozenset[int] = frozenset()
     true: list[str] = field(default_factory=list)
     nothing: Mapping[int, float] = field(default_factory=dict)
     zero: dict[str, float] = field(default_factory=dict)
-    sides: dict[str, float] = field(default_factory=dict)
+    final_signs: dict[str, float] = field(default_factory=dict)
 
     @property
     def c(self) -> CompiledMechanism:

@@ -48,7 +48,7 @@ def continuation_data(here: EventContext) -> dict[str, Any]:
     bounces = [[*names[s], b.count, b.last, b.before] for s, b in here.bounces.items()]
     swings = [[*names[s], *past] for s, past in here.corner_passages.items()]
     every = {"counts": dict(here.counts), "true": list(here.true), "bounces": bounces, "swings": swings}
-    every |= {"zero": dict(here.zero), "sides": dict(here.sides)}
+    every |= {"zero": dict(here.zero), "sides": dict(here.final_signs)}
     return {k: x for k, x in every.items() if x}
 
 
@@ -58,7 +58,7 @@ def restore_continuation_data(here: EventContext, before: Mapping[str, Any]) -> 
     known = {name: s for s, name in enumerate(_switch_names(here))}
     here.counts = {k: int(n) for k, n in before.get("counts", {}).items() if k in names}
     here.zero = {k: float(x) for k, x in before.get("zero", {}).items() if k in names}
-    here.sides = {k: float(x) for k, x in before.get("sides", {}).items() if k in names}
+    here.final_signs = {k: float(x) for k, x in before.get("sides", {}).items() if k in names}
     here.true = [k for k in before.get("true", ()) if k in names]
     for element, label, which, count, last, previous in before.get("bounces", ()):
         if (s := known.get((element, label, which))) is not None:

@@ -171,11 +171,11 @@ def note_rounding_zeros(here: EventContext, loop: GuardedLoop) -> None:
 
 def save_final_signs(here: EventContext, loop: GuardedLoop) -> None:
     """Store the last signs of event expressions that are zero to rounding at the end of the motion."""
-    desk, here.sides = loop.desk, {}
+    desk, here.final_signs = loop.desk, {}
     for g, e in here.structure.events.items():
         near = abs(desk.g[END_VALUES, g]) <= desk.real.drift * desk.g[END_ROUNDING, g]
         if near and abs(desk.side[g]) == 1.0:
-            here.sides[e.name] = float(desk.side[g])
+            here.final_signs[e.name] = float(desk.side[g])
 
 
 def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
@@ -187,7 +187,7 @@ def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
     desk, told = loop.desk, events_at_start(here)
     values = instant_problem(here).guards()
     for g, e in here.structure.events.items():
-        desk.side[g] = 0.0 if e.name in told else here.sides.get(e.name) or np.sign(values[g]) or UNKNOWN_SIDE
+        desk.side[g] = 0.0 if e.name in told else here.final_signs.get(e.name) or np.sign(values[g]) or UNKNOWN_SIDE
         desk.g[END_VALUES, g], desk.g[TRIGGER_VALUES, g] = values[g], here.zero.get(e.name, 0.0)
 
 
@@ -347,7 +347,7 @@ class EventDrivenMotion:
         self.counts = OccurrenceTimes()
         self.guarded = len(here.c.system.guards.kind) > 0
         watched = self.guarded or len(here.c.system.switches.row) or here.structure.model.events
-        here.seen = PhaseRecorder() if watched else None
+        here.recorder = PhaseRecorder() if watched else None
         self.sampling = self._sampling(here.t)
         self.loop = self._loop()
 
@@ -424,7 +424,7 @@ class EventDrivenMotion:
         finally:
             engine.end()
             if isinstance(self.loop, GuardedLoop) and self.guarded:
-                here.watched = guard_check_remark(self.loop)
+                here.detection_remark = guard_check_remark(self.loop)
                 save_final_signs(here, self.loop)
             if self.loop is not None and here.failed is None:
                 here.failed = self.loop.steps.failed
@@ -547,8 +547,8 @@ class EventDrivenMotion:
     def take(self, rows: np.ndarray) -> None:
         """Store output rows."""
         self.rows.append(rows)
-        if self.here.seen is not None:
-            self.here.seen.add(self.here, rows)
+        if self.here.recorder is not None:
+            self.here.recorder.add(self.here, rows)
 
     def event(self) -> None:
         """Resolve the event at which the loop stopped, and restart the integration."""
@@ -563,10 +563,10 @@ class EventDrivenMotion:
         if found := self.counts.accumulate(fired, self.intervals.end):
             raise accumulating_events(instant_problem(here), *found)
         if isinstance(self.loop, GuardedLoop):
-            here.astray = missed_crossings(here, self.loop)
+            here.missed_crossings = missed_crossings(here, self.loop)
             note_fired_zeros(here, self.loop)
         self.resolve(fired)
-        here.astray, here.nothing = frozenset(), {}
+        here.missed_crossings, here.nothing = frozenset(), {}
 
     def resolve(self, fired: Sequence[int]) -> None:
         """Resolve the instant at which these guards triggered."""

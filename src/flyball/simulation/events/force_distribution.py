@@ -343,7 +343,7 @@ def sliding_rows(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) ->
                 lean = float(P.u[k]) / speed
                 if n.kinds[p.switch].forces == DISC:
                     mu = float(n.S.switch_numbers.kinetic_friction[parts[own[0]].switch])
-                    out[k] = parts[k]._replace(rule=SLIDING, lean=lean, gain=mu)
+                    out[k] = parts[k]._replace(rule=SLIDING, direction=lean, gain=mu)
                     P.gain[k, p.of] = (1.0 - FRICTION_REDUCTION) * mu
                 else:
                     out[k] = parts[k].sliding(lean)

@@ -154,7 +154,7 @@ def with_restitution(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return impulses and velocities with restitution added."""
     x, u = hit
-    bounces = [n.kinds[p.switch].keeps_bounds and p.switch not in n.here.astray for p in parts]
+    bounces = [n.kinds[p.switch].keeps_bounds and p.switch not in n.here.missed_crossings for p in parts]
     bounce = np.where(bounces, n.S.switch_numbers.restitution[[p.switch for p in parts]], 0.0)
     least = np.where((P.rule == UNILATERAL) & (x > 0.0), bounce * x, 0.0)
     if not least.any():
@@ -216,7 +216,7 @@ class BounceSeries:
 def note_bounces(n: InstantProblem, jumped: Jump) -> None:
     """Count the impacts of this jump in the series of their stops."""
     t = n.here.t
-    for s in jumped.closing.keys() - n.here.astray:
+    for s in jumped.closing.keys() - n.here.missed_crossings:
         b = n.here.bounces.setdefault(s, BounceSeries())
         if t - b.last > 1.5 * (b.last - b.before):
             b.count = 0  # another series

@@ -273,7 +273,7 @@ class InstantProblem:
             x[...] = 0
         for i, part in enumerate(parts):
             B.which[i], B.sign[i], B.way[i], B.rate[i] = part.switch, part.sign, part.way, part.rate
-            P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.lean, part.const, part.state
+            P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.direction, part.const, part.state
             if part.of >= 0:
                 P.gain[i, part.of] = part.gain
         self.set_sliding(parts)
@@ -433,7 +433,7 @@ def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_
         rules = (FRICTION_LINE,) if len(own) == 1 else (FRICTION_DISC, FRICTION_DISC_2)
         return [ProblemRow(s, rule, state=AT_REST, gain=mu, of=at) for s, rule in zip(own, rules, strict=True)]
     d = _slip_direction(n, own)
-    return [ProblemRow(s, SLIDING, lean=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
+    return [ProblemRow(s, SLIDING, direction=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
 
 
 def use_kinetic_friction(n: InstantProblem, parts: Sequence[ProblemRow], P: DenseProblem, resting: np.ndarray) -> bool:
@@ -478,7 +478,7 @@ def sliding_at_cone(
         if size >= reach[i] - least[i]:
             mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
             for k in own:
-                out[k] = parts[k]._replace(rule=SLIDING, lean=-float(x[k]) / size if size else 0.0, gain=mu)
+                out[k] = parts[k]._replace(rule=SLIDING, direction=-float(x[k]) / size if size else 0.0, gain=mu)
     return out
 
 

@@ -162,7 +162,7 @@ class ModeDecision:
     x: np.ndarray
     u: np.ndarray
     state: np.ndarray
-    lean: np.ndarray
+    direction: np.ndarray
     reach: np.ndarray
     sizes: dict[int, float]
     least: dict[int, float]
@@ -220,7 +220,7 @@ def _violates_rule(n: InstantProblem, found: ModeDecision, i: int) -> bool:
     if p.rule != SLIDING:
         return bool(found.u[i] < -least)
     own = [k for k, q in enumerate(found.parts) if k == i or (p.of >= 0 and q.of == p.of and q.rule == SLIDING)]
-    return bool(found.u[own] @ [found.parts[k].lean for k in own] < -least)
+    return bool(found.u[own] @ [found.parts[k].direction for k in own] < -least)
 
 
 def _released_row(p: ProblemRow, x: float) -> ProblemRow:
@@ -301,10 +301,10 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
                 W.modes.hold[s] = (W.modes.lower if p.sign > 0.0 else W.modes.upper)[s]
             ways[s] = p.sign if p.rule == UNILATERAL else 0.0
         elif kind.forces == INTERVAL:
-            ways[s] = found.lean[i]
+            ways[s] = found.direction[i]
     for s in n.of(lambda kind: kind.permanent):
         W.modes.released[s] = RELEASED if W.modes.mode[s] == OFF else 0.0
-    write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
+    write_slips(n, found.parts, (found.state, found.x, found.u, found.direction))
     write_sharing_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
         W.counts.load_updates = SLOPES_UNKNOWN

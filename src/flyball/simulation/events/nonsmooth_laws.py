@@ -193,7 +193,7 @@ class Corners:
     def fired(self, guards: np.ndarray) -> None:
         """Note the guards that triggered, and the velocities at that time."""
         found = self.n.fired(guards, G_CORNER)
-        astray = found & self.n.here.astray
+        astray = found & self.n.here.missed_crossings
         self.at |= found - astray - self._carried(found - astray)
         self.velocity_at_guard = self.n.here.v.copy()
 

@@ -307,7 +307,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
         if jumped is None:
             still |= n.mode != OFF
         else:
-            hits |= {s: s in jumped.at_rest for s in jumped.closing if s not in here.astray}
+            hits |= {s: s in jumped.at_rest for s in jumped.closing if s not in here.missed_crossings}
             fired = guards_still_valid(n, fired, rate)
             still = switches_at_rest(n, fired)
             still[list(jumped.at_rest)] = True
@@ -324,7 +324,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
         remove_residual_rates(n, found)
         n.project()
         if jumped is not None and (
-            jumped.external_impulses or jumped.given or not jumped.closing.keys() <= here.astray
+            jumped.external_impulses or jumped.given or not jumped.closing.keys() <= here.missed_crossings
         ):
             record_jump(n, jumped, since)
             since = here.y.copy()

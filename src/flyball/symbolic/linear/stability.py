@@ -51,7 +51,7 @@ class StabilityConditions:
     parameters: dict[str, float]
     balanced_by: dict[str, Node] = field(default_factory=dict)
     nodes: list[list[Node]] = field(default_factory=list, repr=False)  # coefficients of the factors
-    told: list[Node] = field(default_factory=list, repr=False)  # left-hand sides of the conditions
+    described: list[Node] = field(default_factory=list, repr=False)  # left-hand sides of the conditions
     validity: Validity = field(default=Validity(), repr=False)
 
     def holds(self, **parameters: float) -> bool:
@@ -67,7 +67,7 @@ class StabilityConditions:
 
     def left_sides(self, **parameters: float) -> list[float]:
         """Values of the expressions that must be positive."""
-        return [float(x) for x in evaluate(self.told, checked_values(self, parameters))]
+        return [float(x) for x in evaluate(self.described, checked_values(self, parameters))]
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts of the report."""
