@@ -492,10 +492,16 @@ class Linearization:
         return linearize_about(
             self.described,
             LinearizationOptions(
-                inputs=self._operating_point.inputs, outputs=outputs, at=at, coordinates="joint" if self.tree else "absolute",
-                independent=independent, balanced_by=balanced_by, parameters=self._operating_point.parameters, tree=self.tree,
+                inputs=self._operating_point.inputs,
+                outputs=outputs,
+                at=at,
+                coordinates="joint" if self.tree else "absolute",
+                independent=independent,
+                balanced_by=balanced_by,
+                parameters=self._operating_point.parameters,
+                tree=self.tree,
             ),
-        )  # fmt: skip
+        )
 
 
 def _rate(name: Any) -> Any:
