@@ -5,6 +5,7 @@ import pytest
 
 import flyball as fb
 from flyball.results.diagnostics import MAX_ACCELERATION_VIOLATION
+from flyball.results.motion_record import record_motion
 from tests.layers import both_layers
 from tests.mechanisms import example
 from tests.robust.families import made
@@ -112,6 +113,7 @@ def test_accelerations_that_were_spoilt_are_told(make, part):
     """By a part of those that would be there without the constraints."""
     r = make().simulate(0.1, outputs=3)
     r.vdot[:, 0] += part * G
+    r.record = record_motion(r)
     assert r.health.acceleration_violation > 0.05 * part
     assert any("accelerations miss the constraints" in w for w in r.health.warnings)
 

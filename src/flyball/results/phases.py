@@ -188,9 +188,15 @@ def stored_reference(result: Any, name: str) -> np.ndarray:
         return np.full(len(result.t), _stored_by_events(whole, name)[at] + _stored_at_start(whole, name))
     known = whole.__dict__.setdefault("_basis", {})
     if name not in known:
-        jumped = _at_output_times(whole, _stored_by_events(whole, name)) if whole.phases is not None else 0.0
-        known[name] = jumped + _stored_at_start(whole, name) + np.zeros(len(whole.t))
+        known[name] = stored_by_events(whole, name) + _stored_at_start(whole, name)
     return known[name][at]
+
+
+def stored_by_events(result: Any, name: str) -> np.ndarray:
+    """Return the energy [J] that events have stored in a force since the start, (n,)."""
+    if result.phases is None:
+        return np.zeros(len(result.t))
+    return _at_output_times(result, _stored_by_events(result, name))
 
 
 def event_energies_in_phase(result: Any, k: int) -> dict[str, np.ndarray]:

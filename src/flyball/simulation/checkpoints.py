@@ -15,7 +15,6 @@ import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +25,10 @@ from ..model.model import Model
 from ..progress import ReportProgress, progress_bar
 from ..results import diagnostics
 from ..results.files import save
+from ..results.motion_record import record_motion
 from ..results.result import Result, concatenate_results
 from ..results.result_loading import read_result
 from ..results.study import study_fingerprint
-from .diagnosis import acceleration_violation
 from .impulse_stepping.impulse_simulation import INTERRUPTED_MESSAGE
 from .initial_state import start_time
 from .integration_intervals import Segment
@@ -320,25 +319,13 @@ class CheckpointFile:
         self._files = []
 
 
-# Parts of the health report of a segmented motion that are computed on first access.
-
-
 def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
     """Return ``result`` (the joined segments) with a health report that covers all segments."""
     if len(parts) == 1:
         return result
     health = result.health
-    health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
-    if isinstance(health.options.get("method"), Mapping):  # impulse stepping: accelerations are means
-        health.late |= {
-            "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
-            "warnings": partial(diagnostics.impulse_stepping_warnings, result),
-        }
-        return result
-    health.late |= {
-        "acceleration_violation": partial(acceleration_violation, result),
-        "creep": partial(diagnostics.friction_creep, result),
-        "warnings": partial(diagnostics.motion_warnings, result),
-        "doubtful": partial(diagnostics.doubt_messages, result),
-    }
+    impulses = isinstance(health.options.get("method"), Mapping)
+    result.record = record_motion(result, accelerations=not impulses)
+    judgements = diagnostics.impulse_judgements if impulses else diagnostics.motion_judgements
+    health.late = judgements(result, parts[0].health.late["mobility"])
     return result

@@ -1,21 +1,19 @@
 """Diagnosis: why an integration could not continue; rounding limits; residual of the accelerations.
 
 `failure_reason` finds the cause of a failure: a law that jumps or is not finite, contradictory drivers, a lock-up, a
-friction jam, an unbounded motion, too many steps. `acceleration_violation` checks G vdot = gamma independently of the
-solver.
+friction jam, an unbounded motion, too many steps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..assembly.assembled_state import Assembly, undefined_row
-from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..assembly.compiled_mechanism import CompiledMechanism
 from ..constraints.switch_kinds import BRANCH
 from ..engine import motion
 from ..engine.entry_point import MOTION
@@ -32,12 +30,12 @@ from ..model.expression_parser import tree_text
 from ..model.force import CoordinateForce
 from ..model.messages import abbreviated
 from ..numerics.integrators import time_loop as ex
-from ..tables.table_definitions import LOAD, OFF, REVOLUTE, VALUE
+from ..tables.table_definitions import LOAD, OFF, REVOLUTE
 from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
 from .sampling_instants import sampling_limits_steps
 
 if TYPE_CHECKING:
-    from ..results.result import Result
+    pass
 
 
 class UnresolvedInstant(SimulationError):
@@ -166,74 +164,14 @@ def rounding_suffix(clock: ex.StepState) -> str:
     )
 
 
-MOST_TIMES = 100  # largest number of output times that are checked
-NEGLIGIBLE_ACCELERATION = (
-    1e-14  # relative to the mechanism's length (or a radian) over the squared duration; smaller ones are rounding
-)
-
-
-def acceleration_violation(result: Result) -> float:
-    """Return the largest |G vdot - gamma| at up to `MOST_TIMES` output times, relative to its terms.
-
-    It is evaluated in absolute coordinates whatever the coordinates of the motion, since in others the contributions of
-    two bodies to a row cancel. The terms are |G| M^-1 |f| (accelerations without constraints, which reactions cancel),
-    |G| |vdot|, and the terms of gamma: angular velocities times rates of the rows. At rest or in steady motion the
-    accelerations are only the rounding of these terms; without forces all terms are rounding
-    (`NEGLIGIBLE_ACCELERATION`). With Baumgarte's stabilization gamma includes its terms.
-    """
-    n, old = len(result.t), result.values.structure
-    if not n or not (result.model.joints or result.model.drivers or old.switches):
-        return 0.0
-    if result.pieces:
-        return max(map(acceleration_violation, result.pieces))
-    told = result.values.told
-    own = compile_mechanism(result.model, parameters=told, tree=old.tree, switches=result.phases is not None)
-    c = own
-    if old.tree:
-        c = compile_mechanism(result.model, parameters=told, switches=result.phases is not None)
-    if not len(c.structure.rows):
-        return 0.0
-    picked = np.unique(np.linspace(0, n - 1, min(n, MOST_TIMES)).astype(int)).tolist()
-    accelerations, sizes = _accelerations(result, c), c.sizes
-    held = None if result.phases is None else result.phases.over("switch")
-    span, worst = float(np.ptp(result.t)), 0.0
-    least = NEGLIGIBLE_ACCELERATION / span**2 if span > 0.0 else 0.0
-    for k in picked:
-        q, v, own.z = result.q[k].copy(), result.v[k].copy(), result.states[k].copy()
-        if c is not own:
-            q, v = c.take(own, result.t[k], q, v)
-        if held is not None:
-            c.work.modes.mode[:], c.work.modes.hold[:] = held[:2, :, k]
-            c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.phases.sigma[:, k]  # type: ignore[union-attr]
-        c.at(result.t[k], q, v, MOTION)
-        gap, largest, _ = acceleration_residual(c, v, accelerations[k], sizes, result.health.options)
-        largest = max(largest, least)
-        worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
-    return worst
-
-
-def _accelerations(result: Result, c: CompiledMechanism) -> np.ndarray:
-    """Return the accelerations of all bodies at all output times in the order of c's velocities, (n, nv)."""
-    out = np.zeros((len(result.t), c.structure.nv))
-    planar = c.structure.model.planar
-    for name, b in c.structure.place.items():
-        if b < 0:
-            continue
-        _, R, _, _, alpha, a = result.records.body(result.values.structure.place[name])
-        v0, n = int(c.values.system.tree.v[b]), int(c.values.system.tree.nv[b])
-        turns = [alpha[2]] if planar else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
-        out[:, v0 : v0 + n] = np.stack([*(a[:2] if planar else a), *turns][:n], axis=1)
-    return out
-
-
 def acceleration_residual(
-    c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
+    c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, float, float]:
     """Return the residual of accelerations x in each row, (nr,), the largest sum of a row's terms, and that without x's
     own.
 
     Rows in metres are divided by the mechanism's length. The state (velocities v) is the one in c's workspace,
-    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    evaluated with forces; ``sizes`` are c's.
     """
     S, n = c.values.system, len(c.structure.rows)
     row_p = S.row_start[: n + 1]
@@ -242,9 +180,7 @@ def acceleration_residual(
     def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.bincount(row, entries * x[column], n)
 
-    gamma = c.work.rows.gamma.copy()
-    if o is not None and o.get("stabilization") == "baumgarte":
-        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.rows.nu) + o["beta"] ** 2 * c.work.rows.value
+    gamma = c.work.rows.gamma
     turning = np.zeros(n)
     np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
     asked = times(abs(G), np.abs(_unconstrained_accelerations(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning

@@ -27,9 +27,9 @@ from ..numerics.integrators.butcher_tableaux import tableau
 from ..results import diagnostics
 from ..results.event_driven_contacts import event_driven_contacts
 from ..results.health import Health, changed_velocities, velocity_not_allowed
+from ..results.motion_record import record_motion
 from ..results.result import DeferredArrays, Result
 from .diagnosis import (
-    acceleration_violation,
     contradicting_limits,
     driver_fault,
     failure_reason,
@@ -145,18 +145,14 @@ def make_result(
     result.carried |= continuation_data(here)
     if here.start.part.paused:
         result.carried |= _data_for_next_segment(here, deferred is not None)
-    health.late = {
-        "mobility": partial(mobility, model, start.base),
-        "energy_drift": partial(_energy_drift, result),
-        "acceleration_violation": partial(acceleration_violation, result),
-        "creep": partial(diagnostics.friction_creep, result),
-        "warnings": partial(diagnostics.motion_warnings, result),
-        "doubtful": partial(diagnostics.doubt_messages, result),
-    }
     result.events = here.records
     if here.seen is not None:
         here.seen.told(result)
         result.contacts = event_driven_contacts(result)
+    result.record = record_motion(result, a.compiled.scratch)
+    if unsolved is not None and not result.record.solved:
+        _ = result.vdot  # adds to the remarks where there are no accelerations
+    health.late = diagnostics.motion_judgements(result, partial(mobility, model, start.base))
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
@@ -200,7 +196,3 @@ def _health(start: InitialState, clock: ex.StepState, o: Integration) -> Health:
         coordinates=start.coordinates,
         engine=start.engine.told if start.engine else "",
     )
-
-
-def _energy_drift(result: Result) -> float:
-    return result.energy.drift

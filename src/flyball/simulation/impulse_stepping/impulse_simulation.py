@@ -28,6 +28,7 @@ from ...results.body_sets import BodySetMotion
 from ...results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
 from ...results.energy_balance import CONTACT_ELASTIC, EXCHANGE_SIGNS
 from ...results.health import ContactHealth, Health
+from ...results.motion_record import record_motion
 from ...results.result import Result
 from ...tables.contact_tables import ContactTables, contact_tables
 from ...tables.reference_configuration import BodyState
@@ -265,12 +266,6 @@ def make_impulse_result(
         crowd=sum(b.count for b in model.bulk),
         contact=contact,
     )
-    health.late = {
-        "mobility": partial(mobility, model, base),
-        "energy_drift": lambda: result.energy.drift,
-        "doubtful": lambda: diagnostics.impulse_stepping_doubts(result),
-        "warnings": lambda: diagnostics.impulse_stepping_warnings(result),
-    }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.rows.law)))
     if recorder.held:
@@ -282,6 +277,8 @@ def make_impulse_result(
     result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T, strict=True))
     result.contacts = recorder.as_contacts(contact_bodies, model.planar)
     result.bulk = body_sets(model, scene, recorder)
+    result.record = record_motion(result, accelerations=False)
+    health.late = diagnostics.impulse_judgements(result, partial(mobility, model, base))
     return result
 
 
