@@ -250,9 +250,10 @@ def _worst_defect(r: Result, metric: np.ndarray) -> tuple[np.ndarray, tuple[np.n
     """Return the part of the recorded times with a defect of each velocity, and its largest defect and acceleration."""
     S, length, n = r.values.system, r.values.length, len(r.t)
     rows, vdot = r.record.rows, r.record.figures.vdot
-    inner = np.isfinite(vdot).all(axis=1) & (rows > 1) & (rows < n - 2)
-    if n > 1:
-        inner &= np.array([k - 1 > 0 and (np.diff(r.t[k - 2 : k + 3]) > 0.0).all() for k in rows])
+    ascends = np.diff(r.t) > 0.0
+    regular = np.zeros(n, bool)  # no two times are equal there and at the two rows before and after
+    regular[2:-2] = ascends[:-3] & ascends[1:-2] & ascends[2:-1] & ascends[3:]
+    inner = np.isfinite(vdot).all(axis=1) & regular[rows]
     none = np.zeros(len(metric))
     if not inner.any():
         return none, (none, none)
@@ -301,20 +302,8 @@ REST_SPEED = 1e-7  # lengths of the mechanism per second that count as rest
 MIN_CREEP = 1e-3  # relative to the mechanism's length: larger creep is reported
 
 
-def motion_judgements(result: Result, mobility: Callable[[], Any]) -> dict[str, Callable[[], Any]]:
-    """Return the figures of `Health.late` of a motion, from what its record contains."""
-    return {
-        "mobility": mobility,
-        "energy_drift": partial(energy_drift, result),
-        "acceleration_violation": partial(acceleration_violation, result),
-        "creep": partial(friction_creep, result),
-        "warnings": partial(motion_warnings, result),
-        "doubtful": partial(doubt_messages, result),
-    }
-
-
 def impulse_judgements(result: Result, mobility: Callable[[], Any]) -> dict[str, Callable[[], Any]]:
-    """Return the same for impulse time stepping, whose accelerations are means."""
+    """Return the figures of `Health.late` of impulse time stepping, whose accelerations are means."""
     return {
         "mobility": mobility,
         "energy_drift": partial(energy_drift, result),
@@ -337,7 +326,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
     """Return reasons to check a result, each with a remedy; none for a sound result."""
     texts = [
         *result.health.remarks,
-        *doubt_messages(result),
+        *result.health.doubtful,
         _acceleration_warning(result),
         *_undetermined_load_warnings(result),
         *_undetermined_force_warnings(result),
@@ -574,7 +563,7 @@ def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str
         Joint -> components, as of `Mobility`.
     """
     found = []
-    for name, x in forces_in_events(model).items():
+    for name, x in forces_in_events(model).items() if undetermined else ():
         kind = "force" if name.partition(".")[2].startswith("f") else "torque"
         found.append((name, tuple(k for k in undetermined.get(x.element.name, ()) if k.startswith(kind))))
     return [(name, what) for name, what in found if what]

@@ -420,5 +420,6 @@ class Health:
         return out + [(f"warning {k}", text) for k, text in enumerate(others, 1)]
 
     def __str__(self) -> str:
-        width = max(len(k) for k, _ in self.lines())
-        return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
+        lines = self.lines()
+        width = max(len(k) for k, _ in lines)
+        return "\n".join(f"{k:<{width}}  {v}" for k, v in lines)

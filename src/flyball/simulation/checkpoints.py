@@ -35,6 +35,7 @@ from .integration_intervals import Segment
 from .integration_options import output_times
 from .method_choice import AUTO_METHOD as ANY
 from .method_choice import MethodChoice, SimulateOptions, choose_method, is_unresolved, reason_for_impulses
+from .motion_result import motion_judgements
 from .simulate import Span, simulate, simulate_with_reason
 
 
@@ -326,6 +327,6 @@ def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
     health = result.health
     impulses = isinstance(health.options.get("method"), Mapping)
     result.record = record_motion(result, accelerations=not impulses)
-    judgements = diagnostics.impulse_judgements if impulses else diagnostics.motion_judgements
+    judgements = diagnostics.impulse_judgements if impulses else motion_judgements
     health.late = judgements(result, parts[0].health.late["mobility"])
     return result

@@ -152,10 +152,22 @@ def make_result(
     result.record = record_motion(result, a.compiled.scratch)
     if unsolved is not None and not result.record.solved:
         _ = result.vdot  # adds to the remarks where there are no accelerations
-    health.late = diagnostics.motion_judgements(result, partial(mobility, model, start.base))
+    health.late = motion_judgements(result, partial(mobility, model, start.base))
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
+
+
+def motion_judgements(result: Result, mobility: Callable[[], Any]) -> dict[str, Callable[[], Any]]:
+    """Return the figures of `Health.late` of a motion, from what its record contains."""
+    return {
+        "mobility": mobility,
+        "energy_drift": partial(diagnostics.energy_drift, result),
+        "acceleration_violation": partial(diagnostics.acceleration_violation, result),
+        "creep": partial(diagnostics.friction_creep, result),
+        "warnings": partial(diagnostics.motion_warnings, result),
+        "doubtful": partial(diagnostics.doubt_messages, result),
+    }
 
 
 def _cause_of_failed_step(a: Assembly, clock: ex.StepState) -> str:
