@@ -336,7 +336,7 @@ def reorder(b: Base, dice: random.Random) -> tuple:
 
 def swap(b: Base, dice: random.Random) -> tuple:
     if b.mechanism.assemble().moved:  # it closes near the drawing; frames on the other body close as near, elsewhere
-        raise Unsupported("a start that is not closed as drawn")
+        raise Unsupported("a start that is not closed in the reference configuration")
     return _again(b, changes.swapped(b.mechanism))
 
 

@@ -163,7 +163,7 @@ BACKWARDS = [f[::-1] for f in FACES]
 SURFACES = [
     (FACES[:3], "it is not closed: 3 of its edges have a triangle on one side only. Close its holes and merge"),
     ([FACES[0][::-1], *FACES[1:]], "its triangles do not all face outwards: at 3 edges two neighbours go round"),
-    (BACKWARDS, "triangles of it face inwards (the volume of a part comes out as -0.167). Turn these faces round"),
+    (BACKWARDS, "triangles of it face inwards (the volume of a part is -0.167). Turn these faces round"),
     ([FACES[0], FACES[0][::-1]], "it encloses no volume. Give it a thickness"),
 ]
 
@@ -183,9 +183,7 @@ def test_a_part_that_is_turned_inside_out() -> None:
     """A cavity lies inside; a part beside the others that faces inwards is a mistake."""
     v = np.array(TETRAHEDRON)
     both = {"vertices": np.vstack([10 * v, v + 20]), "faces": np.vstack([FACES, np.array(BACKWARDS) + 4])}
-    assert "triangles of it face inwards (the volume of a part comes out as -0.167)" in said(
-        shape=fb.Mesh(**both), density=1
-    )
+    assert "triangles of it face inwards (the volume of a part is -0.167)" in said(shape=fb.Mesh(**both), density=1)
 
 
 SPHERE, PLATE = fb.Sphere(radius=1), fb.Box(edges=(1, 2, 3))

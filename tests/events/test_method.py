@@ -147,6 +147,6 @@ def test_a_motion_by_impulses_goes_on_by_impulses():
     m = scene(ball())
     first = m.simulate(0.1, outputs=2, method="impulse")
     assert m.simulate(0.2, outputs=2, start=first).health.method == (
-        f"{STEPS}: so went the motion that this one goes on from"
+        f"{STEPS}: as in the motion that this one continues"
     )
     assert m.simulate(0.2, outputs=2, start=m.simulate(0.1, outputs=2)).health.method == ADAPTIVE

@@ -175,10 +175,12 @@ def test_health_says_by_what_it_was_computed():
         .health
     )
     assert h.method == (
-        "generalised-alpha, as asked, steps of 0.01 s, rho_inf = 0.8, index 3: velocities are not held to the constraints"
+        "generalised-alpha, as requested, steps of 0.01 s, rho_inf = 0.8, index 3: velocities are not projected "
+        "on the constraints"
     )
     assert (
-        pendulum().simulate(0.1, outputs=2, step=0.01, method="rk45").health.method == "rk45, as asked, steps of 0.01 s"
+        pendulum().simulate(0.1, outputs=2, step=0.01, method="rk45").health.method
+        == "rk45, as requested, steps of 0.01 s"
     )
     assert not pendulum().simulate(0.1, outputs=2, method="rk45").health.method
 

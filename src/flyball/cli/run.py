@@ -145,7 +145,7 @@ def kinematics(
     request: Request,
     *,
     point: Annotated[
-        list[str] | None, typer.Option(help='Body, frame, or "body:x,y" whose path is drawn; may be repeated.')
+        list[str] | None, typer.Option(help='Body, frame, or "body:x,y" whose path is plotted; may be repeated.')
     ] = None,
     out: OutputFolder = None,
 ) -> None:

@@ -307,7 +307,7 @@ class ContactFinder:
         elif status == FULL_PAIRS:
             self._more_pairs()
         else:
-            raise ValueError(f"status {status} is none that asks for room")
+            raise ValueError(f"status {status} is no status of a full table")
 
     def _more_pairs(self) -> None:
         B, ns = self.search, len(self.geometry.shape_i)

@@ -158,14 +158,14 @@ def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O
     bare, held = model_without_contacts(model, base)
     joined, missing = model_with_contact_joints(bare, place)
     if missing:
-        raise ModelError(f"{analysis} does not know how contacts move: {'; '.join(missing.values())}")
+        raise ModelError(f"{analysis} does not support these contacts: {'; '.join(missing.values())}")
     c = compile_mechanism(bare, parameters=own)
     x = RestState(c, base.t, c.take(base.compiled, base.t, base.q, base.v)[0], np.zeros(len(c.structure.rows)))
     found, bears = support_with_friction(model, place, x, held)
     if found.unbalanced > REST_BALANCE:
         raise AnalysisError(
-            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what "
-            f"acts unbalanced. Ask about=m.equilibrium()"
+            f"{model.name!r} does not rest there: contacts, joints and locked elements leave the fraction "
+            f"{found.unbalanced:.2g} of the forces unbalanced. Give about=m.equilibrium()"
         )
     notes = _contact_notes(touch_states(place, found, x, held, bears), base.t)
     joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()
@@ -201,7 +201,8 @@ def moving_error(model: Model, analysis: str) -> ModelError:
     other = "" if model.contacts or model.bulk else ", or about the end of a motion: about=m.simulate(...)"
     parts = ", ".join(e.title for e in unsupported_elements(model))
     return ModelError(
-        f"{analysis} with {parts} is about rest, and {model.name!r} moves: ask about=m.equilibrium(){other}"
+        f"{analysis} with {parts} is made about a position of rest, and {model.name!r} moves: give "
+        f"about=m.equilibrium(){other}"
     )
 
 
@@ -216,13 +217,13 @@ def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
     limit = tuple(k.name for k in touches if k.state == AT_FRICTION_LIMIT)
     if limit:
         raise SingularityError(
-            f"{', '.join(limit)}: friction is at its limit, so that it sticks one way and slides the other, and there "
-            f"is no linear model",
+            f"{', '.join(limit)}: friction is at its limit: it sticks in one direction and slides in the other, so "
+            "there is no linear model",
             t,
             limit,
         )
     parting = [k.name for k in touches if k.state == ABOUT_TO_PART]
-    return (f"{', '.join(parting)} about to part: what is said holds while it stays closed",) if parting else ()
+    return (f"{', '.join(parting)} about to open: the results are valid while it stays closed",) if parting else ()
 
 
 def _equilibrium_at(at: Assembly) -> Equilibrium:

@@ -350,9 +350,9 @@ def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
         owner = name.partition(".")[0]
         if owner in controllers_by_name(model):
             raise ModelError(
-                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes "
-                f"a motion and needs "
-                f"two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller says"
+                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes a motion and "
+                "needs two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller "
+                "sets"
             )
 
 

@@ -120,9 +120,9 @@ def transverse_slip_warnings(result: Result) -> list[str]:
                 found.append(
                     f"{f.title} acts along {own!r} only, where the surface slips {along:.3g} {slips[own][1]}; along "
                     f"{text!r} it slips {way:.3g} {unit} without friction. One surface has one friction force, mu N "
-                    f"against its whole slip, so that while it slips along {text!r} little force moves it along "
-                    f"{own!r}. Give the bodies shapes and a Contact(friction=...) in place of the joint, or put a body "
-                    f"between them with a joint for each motion, if these are two surfaces"
+                    f"against its total slip velocity: while it slips along {text!r}, a small force moves it along "
+                    f"{own!r}. Give the bodies shapes and a Contact(friction=...) in place of the joint, or put a "
+                    "body between them with a joint for each motion, if these are two surfaces"
                 )
     return found
 
@@ -157,9 +157,9 @@ def orientation_error_warning(result: Result) -> str:
     if not off > MAX_ORIENTATION_ERROR:
         return ""
     return (
-        f"{name!r} turns by up to {turn:.2g} rad a step, which method={result.health.options['method']!r} is not exact "
-        f"for: by that alone its angle comes to be off by about {off:.2g} rad, whatever the energy balance says; give "
-        f"a shorter step"
+        f"{name!r} turns by up to {turn:.2g} rad per step. The error of method={result.health.options['method']!r} in "
+        f"rotations that large makes its angle wrong by about {off:.2g} rad, which the energy balance does not show; "
+        "give a shorter step"
     )
 
 
@@ -467,8 +467,8 @@ def _suspect_intervals(
 def _imbalance_text(x: EnergyBudget, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
     finer = "shorter step" if x.result.health.options.get("step") else "smaller rtol"
     return lost / allowed if allowed > 0.0 else np.inf, (
-        f"the energy balance{x.of} is off by {lost:.3g} J{when} where {moved:.3g} J were moved and {allowed:.1g} J "
-        f"are to be expected; a {finer} may tell whether the motion can be trusted"
+        f"the energy balance{x.of} is off by {lost:.3g} J{when} of {moved:.3g} J moved; {allowed:.1g} J are expected. "
+        f"Compare with a motion with a {finer}"
     )
 
 
@@ -524,7 +524,7 @@ def _violation_warning(result: Result) -> str:
     worst, length = result.health.violation, result.values.length
     if not worst > MAX_VIOLATION * length:
         return ""
-    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' keeps them"
+    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' satisfies them"
 
 
 def _acceleration_warning(result: Result) -> str:
@@ -532,23 +532,25 @@ def _acceleration_warning(result: Result) -> str:
     if not worst > MAX_ACCELERATION_VIOLATION:
         return ""
     return (
-        f"accelerations miss the constraints by a part of {worst:.1e}: a position is all but singular, or masses "
-        f"differ too much. Reactions may miss by thousands of times that part; equilibrium() has those at rest"
+        f"accelerations violate the constraints by {worst:.1e} of their terms: a position is nearly singular, or "
+        "masses differ too much. The relative error of reactions may be a thousand times larger; for a mechanism at "
+        "rest equilibrium() computes them accurately"
     )
 
 
 def _undetermined_load_warnings(result: Result) -> list[str]:
     return [
         f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
-        f"({', '.join(what)}): its load is one choice of many. Replace a joint by one that holds less, as Spherical"
+        f"({', '.join(what)}): its load is not unique. Replace a joint by one with fewer constraints, such as "
+        "Spherical"
         for f, what in undetermined_loads(_frictions_with_load(result), result.health.undetermined)
     ]
 
 
 def _undetermined_force_warnings(result: Result) -> list[str]:
     return [
-        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is one "
-        f"choice of many. Replace a joint by one that holds less, as Spherical"
+        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is not "
+        "unique. Replace a joint by one with fewer constraints, such as Spherical"
         for name, what in undetermined_event_forces(result.model, result.health.undetermined)
     ]
 
@@ -588,7 +590,7 @@ def _creep_warnings(result: Result) -> list[str]:
     limit = MIN_CREEP * result.values.length
     return [
         f"{result.model[name].title} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a "
-        f"smaller stick_speed makes it less"
+        "smaller stick_speed reduces it"
         for name, (speed, distance) in result.health.creep.items()
         if distance > limit
     ]

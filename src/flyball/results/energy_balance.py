@@ -367,9 +367,9 @@ def lag_warning(x: EnergyBudget) -> str:
     off, name = float(by.max()), names[bodies[int(np.argmax(by))]]
     finer = "shorter step" if r.health.options.get("step") else "smaller rtol"
     return (
-        f"the energy is off by up to {np.abs(x.balance).max():.2g} J where down to {x.kinetic.min():.2g} J move: by "
-        f"that alone the motion comes to be {np.abs(lag).max():.2g} s early or late, and {name!r} off by about "
-        f"{off:.2g} m; a {finer} may tell whether it can be trusted"
+        f"the energy is off by up to {np.abs(x.balance).max():.2g} J, and the kinetic energy falls to "
+        f"{x.kinetic.min():.2g} J: this error alone makes the motion {np.abs(lag).max():.2g} s early or late, and the "
+        f"position of {name!r} wrong by about {off:.2g} m. Compare with a motion with a {finer}"
     )
 
 

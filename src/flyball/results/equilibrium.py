@@ -134,7 +134,7 @@ class Equilibrium:
         out += [("position", text) for text in self._positions()]
         if self.weakest:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
-            what = "least stiffness" + (" with controllers' states held" if self.judged_by else "")
+            what = "least stiffness" + (" with constant controllers' states" if self.judged_by else "")
             out.append((what, f"{self.least:.3g} of what acts, along {parts}"))
         out += [("kink", text) for text in self.kinks]
         out += [("contact", str(k)) for k in self.touching[:MAX_CONTACTS]]

@@ -325,7 +325,7 @@ class Result:
         """
         own, other = self.values.structure, compiled.structure
         if list(own.place) != list(other.place) or own.states != other.states or list(own.slices) != list(other.slices):
-            raise ModelError(f"the result of {self.model.name!r} cannot be gone on with: the mechanism is another one")
+            raise ModelError(f"the result of {self.model.name!r} cannot be continued: the mechanism is a different one")
         return self.final[1].copy()
 
     def lines(self) -> list[tuple[str, str]]:

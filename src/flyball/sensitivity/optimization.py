@@ -79,7 +79,7 @@ class OptimizeOptions(DerivativeOptions):
 
 
 ZERO_SLOPE_MESSAGE = (
-    "every derivative is zero where it begins, at the best place or at any other: begin elsewhere to be sure"
+    "every derivative is zero at the start, which may be a minimum or not: start from other values to check"
 )
 LIMIT_MESSAGE = "as many analyses as evaluations= allows"
 FIT_MESSAGES = {  # by the status of SciPy's least_squares
@@ -142,7 +142,7 @@ class ParameterSearch:
         if len(wrong):
             i = wrong[0]
             raise ModelError(
-                f"parameter {self.names[i]!r} begins at {self.start[i]:g}, outside its bound {out[i] * self.scale[i]:g}"
+                f"parameter {self.names[i]!r} starts at {self.start[i]:g}, outside its bound {out[i] * self.scale[i]:g}"
             )
         return out
 

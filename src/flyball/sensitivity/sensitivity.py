@@ -119,7 +119,7 @@ class SensitivityOptions(DerivativeOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.of and self.analysis != "modes":
-            raise ModelError("say which quantities: of=['slider.x'], for instance")
+            raise ModelError("give the quantities: of=['slider.x'], for instance")
 
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
@@ -333,8 +333,8 @@ def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
     if abs(found.least) < LEAST_STIFFNESS_RATIO:
         weak = ", ".join(found.weakest)
         raise SingularityError(
-            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its place is not determined, so it "
-            f"has no derivatives; hold it there by a spring or a driver",
+            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its position is not determined, so "
+            "it has no derivatives; add a spring or a driver there",
             a.t,
             tuple(found.weakest),
         )

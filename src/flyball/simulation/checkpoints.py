@@ -132,9 +132,9 @@ class _SegmentedMotion:
         kept = self.kept
         kept.write()
         result.health.message += (
-            f"; {kept.path} holds it to t = {kept.parts[-1].final[0]:.6g} s, from where the same call goes on"
+            f"; {kept.path} contains it to t = {kept.parts[-1].final[0]:.6g} s; the same call continues from there"
             if kept.parts
-            else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
+            else f"; no segment of it had ended, so {kept.path} contains nothing: the same call starts again"
         )
         return Interrupted(result.health.message, result)
 
@@ -243,8 +243,8 @@ class CheckpointFile:
             raise ModelError(f"{self.path} is a result, but not one that was kept with checkpoint=; {REMEDY}")
         if told["mark"] != self.mark:
             raise ModelError(
-                f"{self.path} is of another motion than this: model, values, options or the version of flyball are not "
-                f"the same. To go on from where it ended give start=fb.load_result(...); else {REMEDY}"
+                f"{self.path} is of another motion than this: model, values, options or the version of flyball are "
+                f"not the same. To continue from its end give start=fb.load_result(...); else {REMEDY}"
             )
         self._run, self._count, self.by = told["run"], told["parts"], told["by"]
         self.parts, self._first = [found], len(found.t)

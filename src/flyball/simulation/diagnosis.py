@@ -55,23 +55,22 @@ def jam_message(e: Any, t: float, single: bool) -> str:
     if not single:
         where = f"of {body_names(e)}" if isinstance(e, Touch) else f"in joint {e.joint!r}"
         return (
-            f"{e.title} {where}: at t = {t:.6g} s no loads were found that go with the friction that they cause, here "
-            f"and elsewhere. Either friction grows with the load that it makes itself faster than that can hold it (a "
-            f"jam, or Painleve's paradox), or there are such loads and the search ended short of them. Less friction "
-            f"is easier (coefficients, radius, bending_length, twist_length); steps by impulses (method='impulse') "
-            f"need no such search"
+            f"{e.title} {where}: at t = {t:.6g} s no joint loads were found that are consistent with the friction "
+            "that they cause. Either there are none, since friction increases its own load too much (a jam, or "
+            "Painleve's paradox), or the iteration did not converge to them. It converges better with less friction "
+            "(coefficients, radius, bending_length, twist_length); impulse time stepping (method='impulse') needs no "
+            "such iteration"
         )
     if isinstance(e, Touch):
         return (
-            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there grows with the load that it "
-            "makes itself "
-            f"faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With less "
-            f"friction, or contact that gives way (law=), there is a solution; steps by impulses go over it"
+            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there increases its own normal force so "
+            "much that there is no finite solution, or several (Painleve's paradox). With less friction, or "
+            "compliant contact (law=), there is a solution; impulse time stepping passes over it"
         )
     return (
-        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
-        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
-        f"over which the joint carries moments (bending_length, twist_length)"
+        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction increases the joint's load by as much as the "
+        "load that causes it, so that there is no finite solution, or several. Check its coefficients, and the "
+        "lengths over which the joint carries moments (bending_length, twist_length)"
     )
 
 
@@ -134,10 +133,9 @@ def rounding_error_remark(clock: ex.StepState) -> str:
     if not size > NOTABLE:
         return ""
     return (
-        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to "
-        "a singular "
-        f"position, the last digits of the state alone change a step by up to {size:.2g} times what "
-        f"rtol = {clock.real.rtol:g} allows. The step was accepted so; a larger rtol asks for what can be had"
+        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to a "
+        f"singular position, rounding of the state alone changes a step by up to {size:.2g} times what rtol = "
+        f"{clock.real.rtol:g} allows. The step was accepted; a larger rtol can be satisfied"
     )
 
 
@@ -159,8 +157,8 @@ def rounding_suffix(clock: ex.StepState) -> str:
     if clock.real.t - clock.real.rounding_found_at > RECENT_SHARE * clock.real.span:
         return ""
     return (
-        f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
-        f"more, as they do close to a singular position; rtol = {clock.real.rtol:g} asks for more than can be had"
+        ". Rounding is the limit there: rounding of the state changes the error of a step by a tenth of it or more, "
+        f"as it does close to a singular position; rtol = {clock.real.rtol:g} cannot be satisfied"
     )
 
 
@@ -359,10 +357,9 @@ def _unbounded_derivative(near: list[tuple], when: str) -> str:
     for what, *sizes in zip(DERIVATIVE_NAMES[1:], *(np.abs(jet[1:]) for jet in near), strict=True):
         if all(x > GROWTH_FACTOR * y for x, y in pairwise(sizes)):
             return (
-                f"has a {what} that grows without bound just {when}, which asks for an infinite "
-                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite "
-                "derivatives (a power "
-                f"of what becomes zero: an exponent of 2 or more), or step5, which goes over smoothly"
+                f"has a {what} that grows without bound just {when}, which requires an infinite "
+                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite derivatives "
+                "(a power of what becomes zero: an exponent of 2 or more), or step5, which changes smoothly"
             )
     return ""
 
@@ -378,9 +375,8 @@ def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str
         slope = max(abs(before[k + 1]), abs(after[k + 1]))
         if abs(change) > JUMP_FACTOR * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
             return (
-                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an "
-                "infinite force; "
-                f"{remedy}"
+                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which requires an "
+                f"infinite force; {remedy}"
             )
     return ""
 
@@ -403,9 +399,9 @@ def _not_finite_motion(a: Assembly, clock: ex.StepState, method: str) -> str:
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
     if not wrong.any() and (corners := _active_corners(a)):
         return (
-            f"just after t = {t:.6g} s nothing was found that holds the motion on the corner of the "
-            f"{' and the '.join(corners)}, or lets it go. Make that law smooth there: max(-1, min(1, x / width)) for "
-            f"sign(x)"
+            f"just after t = {t:.6g} s no motion was found that stays on the corner of the "
+            f"{' and the '.join(corners)}, or leaves it. Make that law smooth there: max(-1, min(1, x / width)) for "
+            "sign(x)"
         )
     return (
         f"the equations of motion are not finite just after t = {t:.6g} s, first at "
@@ -535,8 +531,8 @@ def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
     why = explain_contradiction(c, t, q, v, c.work.rows.gamma.copy(), "/s^2") or (
-        "in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
-        "than its links allow), or it is drawn in a singular position with velocities that it cannot have"
+        "in this position no acceleration satisfies them with these velocities. The mechanism locks (a driver may "
+        "prescribe more than its links allow), or it starts in a singular position with impossible velocities"
     )
     return f"at t = {t:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: {why}"
 
@@ -564,11 +560,11 @@ def _step_too_small(a: Assembly, clock: ex.StepState) -> str:
         )
     what = f"{t}: the step width fell to {clock.real.h:.3g} s{where}" if begun else f"its start, {t}{where}"
     if rounding := rounding_suffix(clock):
-        return f"the integration cannot go on at {what}{rounding}"
+        return f"the integration cannot continue at {what}{rounding}"
     return (
-        f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "
-        f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
-        f"a force that changes abruptly"
+        f"the integration cannot continue at {what}. The mechanism may lock there (a driver prescribes more than its "
+        "links allow), pass a singular position that the tolerance cannot resolve (a larger rtol steps over it), or "
+        "a force changes abruptly"
     )
 
 
@@ -582,9 +578,9 @@ def _too_many_steps(a: Assembly, clock: ex.StepState) -> str:
         return text
     slowest = _component_name(a, _fastest_component(clock))
     return (
-        f"max_steps = {clock.count.limit} steps were taken by t = {clock.real.t:.6g} s; they are "
-        f"{clock.real.h:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
-        f"rtol, or less stiffness (friction too is stiff) there"
+        f"max_steps = {clock.count.limit} steps were taken up to t = {clock.real.t:.6g} s; the last ones are "
+        f"{clock.real.h:.3g} s long because of {slowest}. Give more steps (max_steps=), a larger rtol, or less "
+        "stiffness (friction too is stiff) there"
     )
 
 

@@ -90,14 +90,14 @@ class Integration(Options):
             tableau(self.method)
         except ValueError as error:
             raise ModelError(
-                f"{error}; simulate knows implicit ones too (radau for stiff mechanisms), and impulse, for contact"
+                f"{error}; simulate also has implicit methods (radau for stiff mechanisms), and impulse, for contact"
             ) from None
         self.refuse_without_step()
 
     def refuse_without_step(self) -> None:
         """Refuse a method without error estimate if no step width is given."""
         if self.step is None and not tableau(self.method).E.any():
-            raise ModelError(f"method={self.method!r} has no estimate of its error: give the width of its steps, step=")
+            raise ModelError(f"method={self.method!r} does not estimate its error: give the step size, step=")
 
     def _rates(self) -> None:
         """Set the default rates of Baumgarte's method; refuse rates with any other stabilization."""
@@ -159,7 +159,8 @@ def refuse_beyond_memory(outputs: int, width: int) -> None:
     if outputs * each > SMALL_MEMORY and outputs * each > (there := _memory_of_machine()):
         raise ModelError(
             f"outputs: {outputs:,} times take {outputs * each // 2**20:,} MiB of memory or more, and this machine has "
-            f"{there // 2**20:,} MiB. Ask for fewer ({there // each:,} would fill it), or simulate in parts (start=)"
+            f"{there // 2**20:,} MiB. Give fewer output times ({there // each:,} would fill it), or simulate in parts "
+            "(start=)"
         )
 
 

@@ -154,7 +154,7 @@ def refuse_unknown_surfaces(scene: ContactTables) -> None:
     )
     for text, there in what:
         if there:
-            raise ModelError(f"statics does not know {text}; simulate does")
+            raise ModelError(f"statics does not support {text}; simulate does")
 
 
 def contact_rows(place: ContactState) -> np.ndarray:

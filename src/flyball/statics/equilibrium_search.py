@@ -244,7 +244,7 @@ def search_failure(x: RestState) -> NotConverged:
         )
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
-        f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
+        "nothing balances this. Give a better guess, or add a part that balances it: a spring, a stop, a driver",
         residuals,
     )
 
@@ -396,8 +396,8 @@ def _velocity_of_coordinate(b: Assembly, name: str) -> int:
     row = coordinate_row(s, owner, what)
     if row is None:
         raise ModelError(
-            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate along the way from "
-            f"ground, one of {', '.join(n.name for n in velocity_names(s))}"
+            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate of a joint on the "
+            f"tree from ground, one of {', '.join(n.name for n in velocity_names(s))}"
         )
     return int(s.tables["tree"].v[row])
 
@@ -460,7 +460,9 @@ def _steady_failure(x: MechanismState, names: list[str]) -> NotConverged:
     s, e = x.c.structure, EquationDerivatives(x)
     left, known = e.block("r"), velocity_names(s)
     who = ", ".join(names)
-    begin = f"no steady motion of {s.model.name!r} was found in which {who} turn evenly and all else stands still"
+    begin = (
+        f"no steady motion of {s.model.name!r} was found in which {who} turn uniformly and all other parts are at rest"
+    )
     residuals = {n.name: float(-value) for n, value in zip(known, left, strict=True)}
     gaps, misses = _row_gaps(e), _rate_errors(e)
     if max(gaps.max(initial=0.0), misses.max(initial=0.0)) > STEADY_TOLERANCE:

@@ -158,9 +158,9 @@ def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
     for a, b in zip(had, has, strict=True):
         if (a.friction, a.restitution) != (b.friction, b.restitution):
             raise SimulationError(
-                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which a motion that "
-                f"is integrated takes as they are at its start; let one motion end there (fb.Stop), and go on from it "
-                f"with the other value: simulate(start=run, parameters=...)",
+                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which are constant "
+                "during an event-driven motion; end one motion there (fb.Stop), and continue it with the other "
+                "value: simulate(start=run, parameters=...)",
                 t=here.t,
             )
 
@@ -180,9 +180,7 @@ def _refuse_violated_bounds(here: EventContext, who: str) -> None:
         spec, unit = s.switches[k], switch_units(s)[k]
         bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
         said = (
-            "it is held where no tooth is"
-            if spec.switch.kind == RATCHET
-            else violated_rule(spec, float(x), bounds, unit)
+            "it is locked between teeth" if spec.switch.kind == RATCHET else violated_rule(spec, float(x), bounds, unit)
         )
         raise SimulationError(
             f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
@@ -546,7 +544,7 @@ def _do_impulse(here: EventContext, found: EventActionList) -> ActionReports:
         along = (_unit_of_argument(here, e, a, "impulse") or "N*s").replace("*", " ")
         told = [f"{_vector_text(x[:n])} {along}"] if n else []
         told += [f"{_vector_text(x[n:])} N m s"] if x[n:] else []
-        out.append((e, f"struck {a.on}: {', '.join(told)}"))
+        out.append((e, f"impulse on {a.on}: {', '.join(told)}"))
     return out
 
 
@@ -561,7 +559,7 @@ def _do_note(here: EventContext, found: EventActionList) -> ActionReports:
 def _do_stop(here: EventContext, found: EventActionList) -> ActionReports:
     names = " and ".join(repr(e.name) for e, _, _ in found)
     asked = here.start.base.t + here.clock.real.span
-    here.stopped = f"ended at {here.t:.6g} s by event {names} (asked: {asked:.6g} s)"
+    here.stopped = f"ended at {here.t:.6g} s by event {names} (requested: {asked:.6g} s)"
     return [(e, "ended the motion") for e, _, _ in found]
 
 

@@ -372,7 +372,7 @@ def simulate_by_impulses(
     except NoSolution:
         result = with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, ""), before, part)
         t = float(stepper.pace.real[TIME])
-        result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY_MESSAGE}"
+        result.health.message = f"{model.name!r} cannot continue at t = {t:.6g} s: {NO_WAY_MESSAGE}"
         raise SimulationError(result.health.message, result, t) from None
     message = INTERRUPTED_MESSAGE if interrupted else PAUSED_MESSAGE if part.paused else END_MESSAGE
     message = message.format(float(stepper.pace.real[TIME]))

@@ -172,7 +172,7 @@ class ImplicitSolver:
             known = ", ".join(f"{n} = {x:.6g}" for n, x in there.items() if n not in self._own)
             raise SingularityError(
                 f"{', '.join(self.unknowns)} cannot be followed to {known}: the mechanism does not close there, or "
-                "there is a singular position on the way"
+                "passes a singular position"
             )
         self._at, self._w = there, w
         return dict(zip(self.unknowns, w.tolist(), strict=True))

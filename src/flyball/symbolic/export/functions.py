@@ -189,7 +189,7 @@ def g(x: Functions) -> FunctionParts:
 @exported_function
 def nu(x: Functions) -> FunctionParts:
     """Right-hand side of velocities."""
-    return {"nu": x.traced.nu}, "t q p", "What constraints ask of velocities: G v = nu.", {}
+    return {"nu": x.traced.nu}, "t q p", "Velocity constraints: G v = nu.", {}
 
 
 @exported_function
@@ -201,7 +201,7 @@ def G(x: Functions) -> FunctionParts:
 @exported_function
 def gamma(x: Functions) -> FunctionParts:
     """Right-hand side of accelerations."""
-    return {"gamma": x.traced.gamma}, "t q v p", "What constraints ask of accelerations: G vdot = gamma.", {}
+    return {"gamma": x.traced.gamma}, "t q v p", "Acceleration constraints: G vdot = gamma.", {}
 
 
 @exported_function
