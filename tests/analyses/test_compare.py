@@ -291,7 +291,7 @@ def test_the_table_names_everything(top, tmp_path):
     for name in comparing.EXPLICIT_FORMULATIONS:
         assert name in text
     assert top.names == tuple(comparing.EXPLICIT_FORMULATIONS)
-    assert "kinetic energy reaches" in text
+    assert "largest kinetic energy is" in text
     plain = json.loads(json.dumps(top.as_dict()["formulations"]["partitioning"]))
     assert plain["position_drift"] < ROUNDING
     assert len(top) == len(list(top)) == 9

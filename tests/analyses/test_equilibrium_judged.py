@@ -115,7 +115,7 @@ def test_nothing_stiff_or_free_beside_it_hides_flutter_or_makes_it_up():
     ("options", "why"),
     [
         ({"turning": ["vertical.angle"], "stable": True}, "no hill to go down"),
-        ({"turning": ["vertical.angle"], "preload": ["push.x"]}, "holds a mechanism at rest"),
+        ({"turning": ["vertical.angle"], "preload": ["push.x"]}, "is for a mechanism at rest"),
         ({"stable": True, "preload": ["push.x"]}, "give one of the two"),
     ],
 )

@@ -221,7 +221,7 @@ def test_wrong_motions_are_refused_by_name():
         ({"speed": "t"}, "only positions and angles"),
         ({"shoulder.angle": [1.0, 2.0]}, "2 samples do not fit 11 times"),
         ({"shoulder.angle": ([0, 0.2, 0.1, 1], [0, 1, 2, 3])}, "ascend"),
-        ({"shoulder.angle": ([0, 0.2, 0.3, 0.5], [0, 1, 2, 3])}, "reach from 0 s to 0.5 s"),
+        ({"shoulder.angle": ([0, 0.2, 0.3, 0.5], [0, 1, 2, 3])}, "extend from 0 s to 0.5 s"),
         ({"shoulder.angle": ([0, 0.5, 1], [0, 1, 2])}, "3 samples make no smooth motion"),
         ({"shoulder.angle": {"a": 1}}, "give an expression of t"),
         ({"shoulder.angle": "sin(x)"}, "x"),

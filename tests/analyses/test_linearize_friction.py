@@ -86,7 +86,7 @@ def test_friction_under_reactions_that_nobody_knows_is_refused():
 
 def test_friction_in_motion_is_asked_about_a_motion():
     """Where a mechanism is described in motion nobody says what sticks: a motion does."""
-    said = r"linearize with JointFriction 'bearing' is about rest, and 'shaft' moves: .*about=m.simulate"
+    said = r"linearize with JointFriction 'bearing' is made about a position of rest, and 'shaft' moves: .*about=m.simulate"
     with pytest.raises(fb.ModelError, match=said):
         coaxial().linearize(frozen=True)
 

@@ -266,7 +266,7 @@ def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
 
 
 def test_a_name_of_flyballs_own_is_refused():
-    with pytest.raises(fb.ModelError, match=r"the class Rope of .*test_own_forces.*give the class of your own another"):
+    with pytest.raises(fb.ModelError, match=r"the class Rope of .*test_own_forces.*give your own class another"):
 
         class Rope(BodyForce):
             """Taken."""

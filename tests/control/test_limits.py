@@ -111,5 +111,5 @@ def test_of_two_rests_that_where_the_motion_ended():
     e, other = m.equilibrium(t=20, start=run), m.equilibrium(t=20)
     assert e["A.angle"] == pytest.approx(run["A.angle"][-1], abs=0.1)  # it swings a little still
     assert e["A.angle"] > 0.5 and other["A.angle"] < -0.5
-    with pytest.raises(fb.ModelError, match="another one"):
+    with pytest.raises(fb.ModelError, match="a different one"):
         servo().equilibrium(start=run)

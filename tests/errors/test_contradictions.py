@@ -74,15 +74,16 @@ def test_two_drivers_of_one_freedom():
 @pytest.mark.parametrize("law", ["-0.1*t", "-0.1*t**2"])
 def test_a_start_at_a_dead_centre(law):
     text = refused(driven(crank(0.0), push=("P.displacement", law)))
-    assert "driver 'push' asks for a motion of 'P.displacement' at a dead centre" in text
-    assert "in this position A.angle moves it by nothing, next to it it does" in text
-    assert "ask for a motion of A.angle" in text
+    assert "driver 'push' prescribes a motion of 'P.displacement' at a dead centre" in text
+    assert "in this position A.angle does not change it, at neighbouring positions it does" in text
+    assert "prescribe a motion of A.angle" in text
 
 
 def test_a_coordinate_that_no_freedom_moves():
     text = refused(driven(crank(), lift=("slider.y", "0.1*t")))
     assert (
-        "driver 'lift' asks for a motion of 'slider.y', which no freedom moves, here or nearby; free is A.angle" in text
+        "driver 'lift' prescribes a motion of 'slider.y', which no freedom changes, here or nearby; free is A.angle"
+        in text
     )
 
 
@@ -103,7 +104,10 @@ def test_a_locked_triangle():
 def test_drivers_that_disagree_later():
     """At the start neither asks for anything; the first acceleration tells them apart."""
     text = refused(driven(crank(), one=("A.angle", "t**2"), two=("A.angle", "2*t**2")))
-    assert "one asks for 2 rad/s^2 where the rest gives 4; two asks for 4 rad/s^2 where the rest gives 2" in text
+    assert (
+        "one prescribes 2 rad/s^2 where the other constraints give 4; two prescribes 4 rad/s^2 where the other constraints give 2"
+        in text
+    )
 
 
 def test_drivers_that_part_slowly():

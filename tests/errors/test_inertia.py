@@ -162,8 +162,8 @@ def test_meshes_that_cannot_be(fields: dict, part: str, tmp_path, monkeypatch: p
 BACKWARDS = [f[::-1] for f in FACES]
 SURFACES = [
     (FACES[:3], "it is not closed: 3 of its edges have a triangle on one side only. Close its holes and merge"),
-    ([FACES[0][::-1], *FACES[1:]], "its triangles do not all face outwards: at 3 edges two neighbours go round"),
-    (BACKWARDS, "triangles of it face inwards (the volume of a part is -0.167). Turn these faces round"),
+    ([FACES[0][::-1], *FACES[1:]], "its triangles do not all face outwards: at 3 edges two neighbours are oriented"),
+    (BACKWARDS, "triangles of it face inwards (the volume of a part is -0.167). Flip the normals of these faces"),
     ([FACES[0], FACES[0][::-1]], "it encloses no volume. Give it a thickness"),
 ]
 
@@ -316,7 +316,9 @@ def test_a_fixed_body_is_said_in_other_words() -> None:
 def test_an_initial_condition_says_something() -> None:
     m = fb.Mechanism("m")
     m.add(fb.Body("b", **ONE))
-    with pytest.raises(fb.ModelError, match=r"Initial 'b\.x': it says nothing; give value=\.\.\., rate=\.\.\. or both"):
+    with pytest.raises(
+        fb.ModelError, match=r"Initial 'b\.x': it has no effect; give value=\.\.\., rate=\.\.\. or both"
+    ):
         m.add(fb.Initial("b.x"))
     m.add(fb.Initial("b.x", rate=0.0))
 

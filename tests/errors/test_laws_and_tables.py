@@ -73,7 +73,7 @@ def test_python_functions_that_are_no_laws(what):
 
 def test_a_driver_takes_no_python_function():
     with pytest.raises(
-        fb.ModelError, match=r"law of Driver 'k' is the Python function 'lambda', whose derivatives.*Table"
+        fb.ModelError, match=r"law of Driver 'k' is the Python function 'lambda', which gives no derivatives.*Table"
     ):
         plane().add(fb.Driver("k", "A.angle", lambda t: t))
 

@@ -78,8 +78,8 @@ WRONG = {
     "3": r"when is '3', which never changes",
     "turnd - 1": r"unknown name 'turnd'",
     "0 < t < 1": r"'0 < t < 1' has 2 comparisons; write one: both of two are true where min",
-    "t == 1": r"'t == 1' asks for equality; write the difference",
-    "t - 1 s": r"a quantity in a formula stands in parentheses",
+    "t == 1": r"'t == 1' is an equality; write the difference",
+    "t - 1 s": r"a quantity in a formula must be in parentheses",
     "": r"the expression is empty",
     "start": r"nothing is done at the start; give do",
 }
@@ -110,7 +110,7 @@ UNFIT = [
     (fb.Impulse("rod", torque=(0, 0, 1)), r"torque needs 1 component, such as 0.5, got"),
     (fb.Impulse("rod", torque=1, at=(0, 0)), r"at has no effect on the impulse of a torque alone"),
     (fb.Impulse("rod", (1, 0), at=(0, "2 s")), r"at of Impulse of 'rod' in Event 'e'"),
-    (fb.Impulse("ground", (1, 0)), r"a blow on ground moves nothing"),
+    (fb.Impulse("ground", (1, 0)), r"an impulse on ground has no effect"),
     (fb.Impulse("A", (1, 0)), r"impulse needs 1 component"),
     (fb.Impulse("A", 1, axes="body"), r"axes is of a body; along a coordinate give one number"),
     (fb.Impulse("A", "1 N"), r"impulse of Impulse of 'A' in Event 'e': '1 N': expected a quantity \[N\*m\*s\]"),
@@ -144,7 +144,7 @@ FIELDS = [
     (lambda: fb.Event("e"), r"field 'when' is missing"),
     (lambda: fb.Set("k"), r"Set 'k': field 'value' is missing"),
     (lambda: fb.Note(""), r"give a name"),
-    (lambda: fb.Impulse(step=1e-3), r"choices of steps by impulses are fb.Stepping"),
+    (lambda: fb.Impulse(step=1e-3), r"options of impulse time stepping are fb.Stepping"),
 ]
 
 

@@ -21,7 +21,7 @@ def arm(*parts) -> fb.Mechanism:
 @pytest.mark.parametrize(
     ("when", "error", "said"),
     [
-        ("A.angle + 90 deg", ExpressionError, r"stands in parentheses, here \(90 deg\)"),
+        ("A.angle + 90 deg", ExpressionError, r"must be in parentheses, here \(90 deg\)"),
         ("sin(t)*2.5e-3 kN + t", ExpressionError, r"here \(2\.5e-3 kN\)"),
         ("A.angle > 1 m", UnitError, r"Event 'e': in 'A\.angle > 1 m' A\.angle is '1 rad'; '1 m': expected"),
         ("90 deg < a.x", UnitError, r"in '90 deg < a\.x' a\.x is '1 m'; '90 deg': expected"),

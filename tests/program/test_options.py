@@ -139,7 +139,7 @@ def test_nothing_to_stabilise():
         (lambda m: m.sensitivity(["b.x"], ["k"], about="equilibrium"), "about is for modes"),
         (lambda m: m.optimize(["b.x"], ["k"], minimize=sum, weights=2), "with minimize they do nothing"),
         (lambda m: m.optimize(["b.x"], ["k"], target=[0], evaluations=0), "evaluations must be at least 1"),
-        (lambda m: m.root_locus("k", [1, 2], about=m.simulate(0.1), equilibrium=True), "say either about or"),
+        (lambda m: m.root_locus("k", [1, 2], about=m.simulate(0.1), equilibrium=True), "give either about or"),
         (lambda m: m.linearize(inputs="k"), "inputs is a list of names"),
         (lambda m: m.equilibrium(preload="f"), "preload is a list of names"),
     ],

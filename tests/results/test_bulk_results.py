@@ -144,7 +144,7 @@ def test_health_says_what_went_wrong_with_contacts() -> None:
     (deep,) = ContactHealth(worst_overlap=0.01, size=0.1).warnings()
     assert "10 per cent of the smallest body" in deep
     (begun,) = ContactHealth(worst_overlap=0.01, overlap_at_start=0.01, size=0.1).warnings()
-    assert "as described" in begun
+    assert "in the reference configuration" in begun
     noted = ContactHealth(notes=("no unique force: Painleve",))
     r.health.contact = noted
     assert r.health.warnings == ("no unique force: Painleve",)

@@ -243,7 +243,7 @@ def test_files_of_one_variable_for_each_array_are_read(result: Result, tmp_path:
     same(result, back)
     assert back.health.warnings == result.health.warnings
     rewritten(tmp_path / "r.nc", lambda group: group.attrs.update({"checksum": "0"}))
-    with pytest.raises(fb.ModelError, match="does not fit its checksum"):
+    with pytest.raises(fb.ModelError, match="do not match its checksum"):
         fb.load_result(tmp_path / "r.nc")
 
 

@@ -117,7 +117,7 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if out.violation > VIOLATION and case.options.get("stabilization") != "baumgarte":
         return Verdict("broken", f"violation {out.violation:.2e}", out.violation, energy, out.residual)
     if out.residual > RESIDUAL:
-        told = any("accelerations miss" in w for w in r.health.warnings)
+        told = any("accelerations violate" in w for w in r.health.warnings)
         kind = "warned" if told else "broken"
         return Verdict(kind, f"G vdot - gamma {out.residual:.2e}", out.violation, energy, out.residual)
     if r.health.energy_drift > UNBALANCED * moved + 1e-9 * (1.0 + np.abs(r.energy.potential).max()):

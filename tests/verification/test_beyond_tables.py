@@ -108,7 +108,9 @@ def test_a_motion_that_gets_there_stops_with_element_table_value_and_time(coordi
 
 def test_a_start_beyond_the_ends_is_told_at_once():
     m = cart("curve(value - 0.5)")
-    says = r"force of Actuator 'A': at t = 0 s Table 'curve' is asked for x = -0.5, and its points go from 0 to 1"
+    says = (
+        r"force of Actuator 'A': at t = 0 s Table 'curve' is evaluated at x = -0.5, and its points extend from 0 to 1"
+    )
     for ask in (lambda: m.simulate(1.0), m.equilibrium, m.modes, m.linearize):
         with pytest.raises(fb.FlyballError, match=says):
             ask()
@@ -129,5 +131,5 @@ def test_what_a_file_says(tmp_path):
     assert 'beyond = "repeat"' in (tmp_path / "m.toml").read_text()
     assert fb.load(tmp_path / "m.toml") == m
     (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace('beyond = "repeat"', 'outside = "hold"'))
-    with pytest.raises(fb.ModelError, match=r"Table 'curve': unknown field 'outside'.*it is called beyond"):
+    with pytest.raises(fb.ModelError, match=r"Table 'curve': unknown field 'outside'.*this field is now beyond"):
         fb.load(tmp_path / "m.toml")
