@@ -181,5 +181,5 @@ def test_friction_with_a_grain_is_refused(across):
     m.add(fb.Material("wood", friction=(0.2, across), grain=(1, 0, 0)))
     m.add(fb.Ground("floor", shape=fb.Plane(), material="wood"))
     m.add(fb.Body("box", shape=fb.Box(edges=(0.2, 0.2, 0.1)), mass=1, position=(0, 0, 0.05)), fb.Contact())
-    with pytest.raises(fb.ModelError, match="statics does not know friction with a grain"):
+    with pytest.raises(fb.ModelError, match="statics does not support friction with a grain"):
         m.equilibrium()

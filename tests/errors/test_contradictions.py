@@ -63,8 +63,8 @@ def test_two_drivers_of_one_freedom():
     c, s = 0.2 * np.cos(0.3), 0.2 * np.sin(0.3)
     slope = -s * (1 + c / np.sqrt(0.25 - s * s))
     assert "driver 'one' and driver 'two' move the same freedom through A, B, C, P and disagree" in text
-    assert f"one asks for 2 rad/s where the rest gives {0.1 / slope:.6g}" in text
-    assert f"two asks for 0.1 m/s where the rest gives {2 * slope:.6g}" in text
+    assert f"one prescribes 2 rad/s where the other constraints give {0.1 / slope:.6g}" in text
+    assert f"two prescribes 0.1 m/s where the other constraints give {2 * slope:.6g}" in text
     assert "A, B" not in refused(driven(crank(), one=("A.angle", "2*t"), two=("A.angle", "3*t")))
     m = driven(crank(), one=("A.angle", "2*t"))
     m.add(fb.Initial("P.displacement", rate=0.1))

@@ -212,8 +212,8 @@ WEIGHTS = [
     ({**ONE, "shape": fb.Sphere(radius=1, density=1)}, "density of Sphere has no effect, since mass and inertia of"),
     ({**ONE, "shape": fb.Sphere(radius=1, mass=1)}, "mass of Sphere has no effect"),
     ({**ONE, "shape": fb.Sphere(radius=1, hole=True)}, "hole of Sphere has no effect"),
-    ({"mass": 1, "shape": SPHERE, "inertia_about": (0, 0, 0)}, "inertia_about says how inertia= is counted, which is"),
-    ({"mass": 1, "shape": SPHERE, "inertia_axes": (0, 0, 1)}, "inertia_axes says how inertia= is counted, which is"),
+    ({"mass": 1, "shape": SPHERE, "inertia_about": (0, 0, 0)}, "inertia_about is the reference of inertia=, which is"),
+    ({"mass": 1, "shape": SPHERE, "inertia_axes": (0, 0, 1)}, "inertia_axes is the reference of inertia=, which is"),
     (
         {"mass": 1, "shape": SPHERE, "com": (0, 0, 1)},
         "com is (0, 0, 1) m, but the centre of mass of its shapes is (0, 0, 0) m. Leave com out, or give mass and",

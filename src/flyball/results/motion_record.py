@@ -20,6 +20,7 @@ from ..tables.table_definitions import System
 if TYPE_CHECKING:
     from .result import Result
 
+SHORTEST_SPAN = 1e-150  # [s]: the square of a shorter one underflows
 SOLVE_TOLERANCE = 1e-13  # relative residual of a solve
 MIN_TIMES, MIN_SOLVED, MAX_SOLVED = 32, 16, 100  # least number of recorded times; least and largest with accelerations
 EVALUATIONS_PER_TIME, EVALUATIONS_PER_SOLVE = 40, 100  # of the run
@@ -92,7 +93,7 @@ def record_motion(result: Result, work: PooledBuffer | None = None, acceleration
         out.array("modes")[:] = np.concatenate([*switch[:2], result.phases.sigma[:, rows]]).T  # type: ignore[union-attr]
         released = switch[4]
     span = float(result.t[-1] - result.t[0]) if n else 0.0
-    least = NEGLIGIBLE_ACCELERATION / span**2 if span > 0.0 else 0.0
+    least = NEGLIGIBLE_ACCELERATION / max(span, SHORTEST_SPAN) ** 2 if span > 0.0 else 0.0
     buffers = work, idle_tableau(), idle_clock_pool(states.shape[1] - 1 - s.nv).new(), no_output(), out
     for system, first, last in _systems(result, rows):
         tables = struct_tables(s, system)
