@@ -61,7 +61,7 @@ def test_names():
         m.add(fb.Lag("k", of="1", time=1))
     with pytest.raises(fb.ModelError, match="D is 1 x 1; of 0 states, 2 inputs and 1 outputs it must be 1 x 2"):
         m.add(fb.StateSpace("K", inputs=["1", "t"], D=3))
-    with pytest.raises(fb.ModelError, match="what differentiates has no states"):
+    with pytest.raises(fb.ModelError, match="a transfer function that differentiates has no state-space form"):
         m.add(fb.Transfer("D", of="1", num=[1, 0], den=[1]))
 
 

@@ -187,7 +187,7 @@ def test_analyses_that_know_no_contact_say_so():
 
 @pytest.mark.parametrize("law", ["newton", "moreau"])
 def test_a_law_that_impacts_one_after_the_other_do_not_know(law):
-    with pytest.raises(fb.ModelError, match=f"restitution='{law}' would do nothing"):
+    with pytest.raises(fb.ModelError, match=f"restitution='{law}' has no effect"):
         fb.Stepping(impacts="sequential", restitution=law)
 
 

@@ -251,7 +251,7 @@ def test_what_would_be_elsewhere_in_no_time(layer):
     m = fb.Mechanism("p", planar=True, gravity=(0, -10), parameters={"l": 1.0, "r": 0.1})
     m.add(fb.Body("bob", mass=1, inertia="r", position=("l", 0)), fb.Revolute("A", "ground", "bob", at=(0, 0)))
     m.add(fb.Event("long", "t - 0.5", do=fb.Set("l", 2)))
-    with pytest.raises(fb.SimulationError, match=r"Set of 'l' in Event 'long' would put .* elsewhere in no time"):
+    with pytest.raises(fb.SimulationError, match=r"Set of 'l' in Event 'long' would put .* instantaneously"):
         m.simulate(1, coordinates=layer)
     m.events.clear()
     m.add(fb.Event("none", "t - 0.5", do=fb.Set("r", -1)))

@@ -132,7 +132,7 @@ def test_health_says_that_a_guard_is_no_proof():
     assert "1 event function at" in run.health.watched
     average, least = map(int, re.findall(r"(\d+) (?:places|at least)", run.health.watched))
     assert average >= least
-    assert "is not seen" in run.health.watched
+    assert "can be missed" in run.health.watched
     assert ("watched", run.health.watched) in run.health.lines()
     assert ball().simulate(0.2).health.watched == ""
 

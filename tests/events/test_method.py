@@ -49,7 +49,7 @@ def test_without_contact_nothing_is_said():
     ("parts", "why"),
     [
         ([box(f"b{k}", (k, 0, 0.1)) for k in range(7)], r"at more than|the box of 'b0' on the box of 'b1'"),
-        ([ball(f"b{k}", (k, 0, 0.1)) for k in range(10)], "at 55 places, too many"),
+        ([ball(f"b{k}", (k, 0, 0.1)) for k in range(10)], "at 55 points, too many"),
         ([fb.Bodies("balls", shape=fb.Sphere(radius=0.1), density=1000, position=[(0, 0, 1)])], "is many bodies"),
     ],
 )

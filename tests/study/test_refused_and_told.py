@@ -56,7 +56,7 @@ def test_what_makes_no_values_is_refused(tmp_path):
         oscillator().study({"k": [True, 2.0]}, ["end(b.x)"], t_end=1)
     with pytest.raises(fb.ModelError, match="no such folder"):
         oscillator().study({"k": [1.0]}, ["end(b.x)"], t_end=1, file=tmp_path / "none" / "s.nc")
-    with pytest.raises(fb.ModelError, match="formulations names none"):
+    with pytest.raises(fb.ModelError, match="formulations is empty"):
         oscillator().compare(1.0, formulations=[])
 
 

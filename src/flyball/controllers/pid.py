@@ -91,7 +91,7 @@ class PID(Controller):
         if self.kd != 0.0 and self.filter is None:
             raise ModelError(
                 f"{self.title}: a derivative needs a filter; give filter=..., a tenth of kd/kp for instance: the "
-                f"derivative of what jumps is infinite"
+                "derivative of a signal that jumps is infinite"
             )
         positive(self, n, "filter", "tracking")
         for name, needs, there in (

@@ -162,8 +162,7 @@ def _over_driven_error(found: Mobility) -> MobilityError:
         others = [n for n in s.elements if n not in s.drivers]
         through = f" through {', '.join(others[:MAX_NAMED])}" if others else ""
         texts.append(f"drivers {', '.join(s.drivers)} prescribe the same motion{through}" if len(s.drivers) > 1
-                     else f"driver {s.drivers[0]} prescribes what "
-                     f"{', '.join(others[:MAX_NAMED])} do already")  # fmt: skip
+                     else f"driver {s.drivers[0]} repeats the motion of {', '.join(others[:MAX_NAMED])}")  # fmt: skip
     return MobilityError(
         f"{model.name!r} is over-driven: {'; '.join(texts)}. Leave out one driver of each set; two laws that agree "
         f"only as far as they are rounded would lock the mechanism",

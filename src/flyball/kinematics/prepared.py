@@ -78,7 +78,7 @@ class Prepared:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Raise an error: it is immutable."""
-        raise ModelError(f"{name!r} cannot be set: what is prepared does not change; prepare the changed mechanism")
+        raise ModelError(f"{name!r} cannot be set: a prepared mechanism is constant; prepare the changed mechanism")
 
     @property
     def parameters(self) -> dict[str, float]:

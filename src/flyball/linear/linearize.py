@@ -80,9 +80,7 @@ class OperatingPointOptions(Options):
         if self.about is not None and self.t is not None:
             raise ModelError("about has its own time: leave out t")
         if self.frozen and isinstance(self.about, Equilibrium) and not self.about.speeds:
-            raise ModelError(
-                "frozen is about a motion: at an equilibrium nothing moves, and it does nothing; leave it out"
-            )
+            raise ModelError("frozen applies to a motion; it has no effect at an equilibrium, so leave it out")
 
     def state(self, model: Model, many: SizeTest | None = None) -> MechanismState:
         """State at the operating point; in absolute coordinates if ``many`` holds for its velocities and rows."""

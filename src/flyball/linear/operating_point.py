@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 SizeTest = Callable[[int, int], bool]
-SPARSE_REASON = "absolute: of so many velocities the equations are sparse there"
+SPARSE_REASON = "absolute: with this many velocities their equations are sparse"
 
 
 def operating_state(
@@ -121,7 +121,7 @@ def _assembly_at_equilibrium(model: Model, about: Equilibrium, parameters: Mappi
         loaded = {name.partition(".")[0] for name in about.preload}
         parts, others = ([e for e in m.elements() if e.name not in loaded] for m in (model, own))
         if parts != others:
-            raise ModelError(f"{model.name!r} is not what it was when its preload was found; find it again")
+            raise ModelError(f"{model.name!r} has changed since its preload was computed; compute it again")
         model = own
     if [b.name for b in model.bodies] != [b.name for b in old.structure.model.bodies]:
         raise ModelError(f"about is an equilibrium of {old.structure.model.name!r}, which has other bodies")
@@ -276,8 +276,8 @@ def frozen_mode_model(
 
 def _mode_notes(model: Model, removed: dict[str, None], parts: list[Element], slides: list[str]) -> tuple[str, ...]:
     held = {p.name for p in parts}
-    said = ((", ".join(model[n].title for n in held), "held"), (", ".join(slides), "taken to slide on as it does"),
-            (", ".join(model[n].title for n in removed if n not in held), "open, and left out"))  # fmt: skip
+    said = ((", ".join(model[n].title for n in held), "held"), (", ".join(slides), "assumed to keep sliding"),
+            (", ".join(model[n].title for n in removed if n not in held), "open, not in the model"))  # fmt: skip
     return tuple(f"{names}: {what}" for names, what in said if names)
 
 

@@ -432,7 +432,7 @@ class RootLocusOptions(OperatingPointOptions):
         if self.about is not None and self.equilibrium:
             raise ModelError("root_locus: give either about or equilibrium=True, which finds the position itself")
         if self.frozen and self.equilibrium:
-            raise ModelError("root_locus: frozen does nothing where nothing moves: leave out frozen or equilibrium")
+            raise ModelError("root_locus: frozen has no effect at an equilibrium: leave out frozen or equilibrium")
 
     def here(self, value: float, about: Equilibrium | None) -> OperatingPointOptions:
         """Operating point at a value; at an equilibrium if that is given."""

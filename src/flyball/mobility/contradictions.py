@@ -116,7 +116,7 @@ def _nothing_free(case: ContradictionCase, name: str, holding: list[str], rows: 
     """Explain that the other constraints leave no freedom: it is a structure, or needs special dimensions."""
     counted = case.c.structure.nv - rows
     names = ", ".join(holding[:MAX_NAMED])
-    begin = f"{_prescriber_title(case, name)} finds nothing to move: the constraints of {names} leave no freedom"
+    begin = f"{_prescriber_title(case, name)} has nothing to move: the constraints of {names} leave no freedom"
     if counted >= 0 or case.c.structure.model.planar or rank_of(G.toarray()) == rows:
         return (
             f"{begin}, and counting joints leaves {counted}: it is a structure. Replace a joint by one with fewer "

@@ -503,7 +503,7 @@ class Bodies(Element):
         given |= dict.fromkeys(("inertia_about", "inertia_axes", "com"))
         found = mass_properties(self.one, SimpleNamespace(**given), env, planar)
         if not found.mass.real > 0.0:
-            raise ModelError(f"{self.title}: its mass is 0, and what touches needs one")
+            raise ModelError(f"{self.title}: its mass is 0, and a body in contact needs one")
         return found
 
     def start(self, planar: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -53,8 +53,8 @@ def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode
     a, b = parts
     if a.kind == "number" and abs(a.value - 1.0) <= SINGULAR_GAIN:
         raise ModelError(
-            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, which "
-            f"leaves it open: {ring}. Have one of them go through a state, as a Lag or an Integrator has"
+            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, so it is "
+            f"not determined: {ring}. Add a state to this loop, with a Lag or an Integrator"
         )
     return _over(b, _plus(ONE, _minus(a)))
 

@@ -74,7 +74,7 @@ def _unsupported_in_words(parts: list[Element]) -> str:
     """Describe the unsupported parts."""
     kinds = {e.category for e in parts}
     said = ["no contact, limits or Bodies"] if kinds & set(CONTACT_CATEGORIES) else []
-    said += ["nothing that sticks, locks or goes taut"] if kinds - {*CONTACT_CATEGORIES, "events"} else []
+    said += ["no elements with modes (stick friction, locks, ropes)"] if kinds - {*CONTACT_CATEGORIES, "events"} else []
     said += ["no events"] if "events" in kinds else []
     return ", and ".join(said)
 

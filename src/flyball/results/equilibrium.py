@@ -48,7 +48,7 @@ class Touch:
     gap: float = 0.0
 
     def __str__(self) -> str:
-        part = f"{100.0 * self.used:.3g} % of what it bears"
+        part = f"{100.0 * self.used:.3g} % of its largest force"
         friction = f", friction {self.tangential:.4g} N, {part}" if self.used else ""
         return f"{self.name} {self.state}, presses with {self.normal:.4g}{friction}"
 

@@ -128,7 +128,7 @@ def _systems(result: Result, rows: np.ndarray) -> list[tuple[System, int, int]]:
 
 def _own_energies(s: Structure) -> list[int]:
     """Return the forces whose energy differs from that of the compiled formula of their kind."""
-    return [k for k, f in enumerate(s.forces) if ENERGIES.get(f.kind) is not f.energy]
+    return [k for k, f in enumerate(s.forces) if ENERGIES.get(getattr(f, "kind", -1)) is not f.energy]
 
 
 def _remove_released(s: Structure, released: np.ndarray, elastic: np.ndarray) -> None:

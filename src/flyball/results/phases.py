@@ -361,7 +361,7 @@ class Moment:
         if not np.isfinite(value).all():
             raise ModelError(
                 f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "
-                f"constraints jump there; read positions, velocities and energies, or what is at output times"
+                "constraints jump there; read positions, velocities and energies, or values at output times"
             )
         return float(value) if np.ndim(value) == 0 else value
 

@@ -88,17 +88,17 @@ class DerivativeOptions(Options):
             raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, all_)}; {listing(all_)}")
         for name in ("t_end", "outputs", "rtol", "atol"):
             if getattr(self, name) is not None and self.analysis != "motion":
-                raise ModelError(f"{name} is of a motion; with analysis={self.analysis!r} it does nothing")
+                raise ModelError(f"{name} applies to a motion; with analysis={self.analysis!r} it has no effect")
         if self.analysis == "motion" and self.t_end is None:
             raise ModelError("sensitivity of a motion: give t_end")
         refuse_unknown_coordinates(self.coordinates)
         if self.coordinates != "auto" and self.analysis != "motion":
-            raise ModelError(f"coordinates are those of a motion; with analysis={self.analysis!r} they do nothing")
+            raise ModelError(f"coordinates apply to a motion; with analysis={self.analysis!r} they have no effect")
         for name in ("rtol", "atol"):
             if getattr(self, name) is not None:
                 require_positive(getattr(self, name), name)
         if self.about is not None and self.analysis != "modes":
-            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it does nothing")
+            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it has no effect")
         if self.about not in (None, "equilibrium"):
             raise ModelError(f"about must be 'equilibrium' or nothing, got {_value_text(self.about)}")
 

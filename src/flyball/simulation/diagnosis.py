@@ -267,8 +267,8 @@ def _overcome_fault(a: Assembly) -> str:
     if found is None:
         return ""
     return (
-        f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
-        f"function is at fault, mend it"
+        f"in a step that was then taken again, shorter, {found.message}. The motion does not contain that step; if "
+        "the function is wrong, correct it"
     )
 
 
@@ -368,7 +368,7 @@ def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str
     """Describe a jump between value and derivatives just before and just after an instant; empty if there is none."""
     if not all(map(math.isfinite, before)):
         return ""
-    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) goes over smoothly"), (1, "step5 or a cubic Table goes smoothly")):
+    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) changes smoothly"), (1, "step5 or a cubic Table changes smoothly")):
         change = after[k] - before[k]
         if wrapped and k == 0:
             change = math.atan2(math.sin(change), math.cos(change))
@@ -442,7 +442,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
         for k, e in enumerate(forces):
             if isinstance(e, Touch):
                 if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
-                    return f"what {e.title} presses with is no number"
+                    return f"the normal force of {e.title} is not finite"
                 continue
             F, M, par = (
                 load_record(W.FK, S.forces.F[k]),
@@ -451,7 +451,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
             )
             x, y = law_inputs(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
-                return f"what {e.title} measures is no number. {e.fails}"
+                return f"the measured quantity of {e.title} is not finite. {e.fails}"
             laws = [
                 float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
                 for at in S.forces.laws[k].tolist()
@@ -534,7 +534,7 @@ def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
         "in this position no acceleration satisfies them with these velocities. The mechanism locks (a driver may "
         "prescribe more than its links allow), or it starts in a singular position with impossible velocities"
     )
-    return f"at t = {t:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: {why}"
+    return f"at t = {t:.6g} s no accelerations satisfy the constraints of {', '.join(names[:8])} together: {why}"
 
 
 def _friction_jam(a: Assembly, clock: ex.StepState) -> str:

@@ -66,7 +66,7 @@ class Integration(Options):
             if own[name] is not None or name in ("rtol", "max_step"):
                 require_positive(own[name], name)
         if self.step is not None and self.max_step != np.inf:
-            raise ModelError("max_step does nothing with steps of fixed width (step=); leave one of the two out")
+            raise ModelError("max_step has no effect with fixed steps (step=); leave one of the two out")
         require_count(self.max_steps, "max_steps")
         if self.rtol < FINEST_RTOL:
             raise ModelError(
@@ -74,8 +74,8 @@ class Integration(Options):
             )
         if self.rtol > COARSEST_RTOL:
             raise ModelError(
-                f"rtol must not be larger than {COARSEST_RTOL:g}, got {self.rtol!r}: every step might be off by that "
-                f"part of the motion"
+                f"rtol must not be larger than {COARSEST_RTOL:g}, got {self.rtol!r}: every step might have this "
+                "relative error"
             )
         known_coordinates(self.coordinates)
         if self.stabilization not in STABILIZATION:
@@ -108,8 +108,8 @@ class Integration(Options):
                 require_positive(value, name)
                 object.__setattr__(self, name, value)
             elif value is not None:
-                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it does "
-                                 f"nothing")  # fmt: skip
+                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it has "
+                                 "no effect")  # fmt: skip
 
     def sized(self, length: float) -> Self:
         """Return the options with `tolerance` as ``atol``."""
@@ -277,8 +277,8 @@ class Stepping:
                 )
         if self.impacts == "sequential" and self.restitution != "poisson":
             raise ModelError(
-                f"impacts='sequential' of Stepping go by Poisson's law, so restitution={self.restitution!r} would do "
-                f"nothing; leave one of the two out"
+                f"impacts='sequential' of Stepping uses Poisson's law, so restitution={self.restitution!r} has no "
+                "effect; leave one of the two out"
             )
 
         if self.solver in CONVEX_ONLY_SOLVERS and self.coulomb:

@@ -235,8 +235,9 @@ def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) ->
         return ""
     i = int(np.argmax(grown))
     return (
-        f"the motion grows without bound: by t = {clock.real.t:.6g} s {_component_in_words(a, i, float(y[i]), named)}. "
-        f"Look for what drives it: a gain, a damping or a stiffness of the wrong sign, a controller that is unstable"
+        f"the motion grows without bound: by t = {clock.real.t:.6g} s "
+        f"{_component_in_words(a, i, float(y[i]), named)}. Possible causes: a gain, damping or stiffness of the wrong "
+        "sign, an unstable controller"
     )
 
 

@@ -57,7 +57,7 @@ def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> s
     """
     places = contact_points(model, parameters).touches
     if len(places) > FEW:
-        return f"bodies may touch at {len(places)} places, too many to go from touch to touch (most {FEW})"
+        return f"bodies may touch at {len(places)} points, too many for event-driven integration (at most {FEW})"
     return "" if model.planar else _indeterminate_friction(places)
 
 
@@ -136,7 +136,7 @@ def refuse_idle_options(o: Any) -> None:
         )
     if o.specialize is True:
         raise ModelError(
-            f"specialize=True does nothing with method={o.method!r}, which is computed by the tables; leave it out"
+            f"specialize=True has no effect with method={o.method!r}, which uses the general engine; leave it out"
         )
 
 
@@ -207,8 +207,8 @@ def _refuse_open_loads(start: InitialState, method: str) -> None:
     if found:
         names = ", ".join(f.title for f, _ in found)
         raise ModelError(
-            f"method={method!r} cannot have {names}: it follows reactions that redundant constraints leave open "
-            f"(m.mobility() names them); leave method out, or take the redundancy out"
+            f"method={method!r} cannot have {names}: it depends on reactions that redundant constraints leave "
+            "undetermined (m.mobility() names them); leave method out, or remove the redundancy"
         )
 
 
@@ -276,11 +276,11 @@ class SimulateOptions(Integration):
             return
         if self.method != GENERALISED_ALPHA:
             raise ModelError(
-                f"rho_inf is a number of method={GENERALISED_ALPHA!r}; with method={self.method!r} it does nothing"
+                f"rho_inf belongs to method={GENERALISED_ALPHA!r}; with method={self.method!r} it has no effect"
             )
         if isinstance(self.rho_inf, bool) or not isinstance(self.rho_inf, Real) or not 0.0 <= self.rho_inf <= 1.0:
-            raise ModelError(f"rho_inf is a number from 0 (swings too fast for a step go at once) to 1 (no swing is "
-                             f"damped), got {self.rho_inf!r}")  # fmt: skip
+            raise ModelError("rho_inf is a number from 0 (oscillations too fast for the step are removed at once) to "
+                             f"1 (no oscillation is damped), got {self.rho_inf!r}")  # fmt: skip
 
     def check_method(self) -> None:
         """Check that the method is an integrator, impulse time stepping, or ``"auto"``."""

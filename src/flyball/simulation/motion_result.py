@@ -119,7 +119,7 @@ def make_result(
     t = float(clock.real.t)
     message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
-        message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+        message = f"interrupted by the user at t = {t:.6g} s; the motion so far is kept"
     elif here.start.part.paused:
         message = PAUSED_MESSAGE.format(t)
     elif here.failed is not None:

@@ -231,8 +231,8 @@ def _refuse_idle_stabilization(start: InitialState, stabilization: str) -> None:
         joint = len(start.base.compiled.values.system.rows.law) > 0
         where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
         raise ModelError(
-            f"stabilization={stabilization!r} does nothing: {where}no constraint is left to be kept; leave it out"
-            f"{remedy}"
+            f"stabilization={stabilization!r} does nothing: {where}there are no constraints to stabilise; leave it "
+            f"out{remedy}"
         )
 
 

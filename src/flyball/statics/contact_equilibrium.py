@@ -254,8 +254,8 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
     found, bears = support_with_friction(model, place, x, held)
     if found.unbalanced > REST_BALANCE:
         raise NotConverged(
-            f"{model.name!r} came to rest where contacts and joints leave {found.unbalanced:.2g} of what acts "
-            f"unbalanced; begin nearer to where it rests",
+            f"{model.name!r} came to rest where contacts and joints leave the fraction {found.unbalanced:.2g} of the "
+            "forces unbalanced; start nearer to its position of rest",
             {},
         )
     return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))

@@ -593,8 +593,8 @@ def controlled_search_failure(x: RestState, other: AuxiliaryModel) -> NotConverg
     k = int(np.argmax(left[rows]))
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, "
-        f"{rate_description(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look "
-        f"whether the controller can change what it measures, its limits considered",
+        f"{rate_description(other, rates, [*rates][k])}, and nothing stops that. Give a better guess, or check "
+        "whether the controller can influence its measured quantity within its limits",
         own,
     )
 

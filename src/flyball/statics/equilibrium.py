@@ -247,8 +247,9 @@ class EquilibriumOptions(Options):
         super().__post_init__()
         if self.stable and self.turning:
             raise ModelError(
-                "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
-                "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
+                "stable=True follows decreasing potential energy from an unstable equilibrium, which a steady motion "
+                "does not have. Leave stable= out and start nearer to the wanted motion: by described positions, or "
+                "start="
             )
         if self.stable and self.preload:
             raise ModelError(
@@ -308,7 +309,8 @@ def _refuse_with_contact(o: EquilibriumOptions) -> None:
     for name in ("preload", "turning", "stable"):
         if getattr(o, name):
             raise ModelError(
-                f"{name}= is for mechanisms without contact; with contact it comes to rest by itself. Leave it out"
+                f"{name}= is for mechanisms without contact; with contact the position of rest is found by a "
+                "motion. Leave it out"
             )
 
 

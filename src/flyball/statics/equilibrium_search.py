@@ -239,7 +239,7 @@ def search_failure(x: RestState) -> NotConverged:
     if jumps:
         return NotConverged(
             f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
-            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            "force is not balanced. Write a smooth law, for instance tanh(x/w) for sign(x)",
             residuals,
         )
     return NotConverged(
@@ -298,8 +298,8 @@ def _infinitesimal_mechanism_error(x: RestState, u: np.ndarray, w: np.ndarray) -
     shakes = velocity_names(x.c.structure)[int(np.argmax(np.abs(w)))].name
     return SingularityError(
         f"{x.c.structure.model.name!r} has no equilibrium at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
-        f"depend on each other there, so that it can shake along {shakes}, and no finite reaction carries the load "
-        f"along it. Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
+        f"are dependent there, so that it can shake along {shakes}, and no finite reaction carries the load along it. "
+        "Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
         x.t,
         names,
     )

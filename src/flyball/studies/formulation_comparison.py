@@ -215,7 +215,7 @@ def _checked_names(names: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(EXPLICIT_FORMULATIONS)
     wanted = (names,) if isinstance(names, str) else tuple(names)
     if not wanted:
-        raise ModelError(f"formulations names none: nothing would be compared; {listing(list(FORMULATIONS))}")
+        raise ModelError(f"formulations is empty: nothing would be compared; {listing(list(FORMULATIONS))}")
     for name in wanted:
         if name not in FORMULATIONS:
             raise ModelError(

@@ -510,7 +510,7 @@ def _compute_missing(question: RunSpecification, found: Study, o: StudyOptions, 
                     save_study(found, o.file)
                     saved = time.monotonic()
     except KeyboardInterrupt:
-        found.message = "interrupted by the user; what was computed is kept"
+        found.message = "interrupted by the user; the completed runs are kept"
     except FlyballError:
         raise
     except Exception as error:

@@ -151,8 +151,8 @@ def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
     )
     if not moved.max() <= PLACE_TOLERANCE * here.c.values.length:
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put what touches at {had[int(moved.argmax())].title} elsewhere in no "
-            f"time, by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
+            f"at t = {here.t:.9g} s {who} would move the contact of {had[int(moved.argmax())].title} instantaneously, "
+            f"by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
             t=here.t,
         )
     for a, b in zip(had, has, strict=True):
@@ -183,9 +183,9 @@ def _refuse_violated_bounds(here: EventContext, who: str) -> None:
             "it is locked between teeth" if spec.switch.kind == RATCHET else violated_rule(spec, float(x), bounds, unit)
         )
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
-            f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "
-            f"is fixed to",
+            f"at t = {here.t:.9g} s {who} would put {spec.element.title} instantaneously, by {past[k]:.3g} {unit}: "
+            f"{said}. Set it where the coordinate is within it, give it stiffness=..., or let a Driver move what it "
+            "is fixed to",
             t=here.t,
         )
 
@@ -230,8 +230,8 @@ def _refuse_moved_bodies(here: EventContext, who: str, before: BodyPlaces, after
     worst = max(off, key=lambda name: off[name] if np.isfinite(off[name]) else np.inf)
     if not off[worst] <= PLACE_TOLERANCE:
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put {worst} elsewhere in no time, by {off[worst] * size:.3g}: a "
-            f"parameter that is set may change forces, laws and masses, not where things are. Let a Driver move it",
+            f"at t = {here.t:.9g} s {who} would put {worst} instantaneously, by {off[worst] * size:.3g}: setting a "
+            "parameter may change forces, laws and masses, but not positions. Let a Driver move it",
             t=here.t,
         )
     worst = max(fast, key=lambda name: fast[name] if np.isfinite(fast[name]) else np.inf)
@@ -433,7 +433,8 @@ def report_missed_events(here: EventContext) -> None:
     for e in here.structure.model.events:
         if e.name in here.true and not here.counts.get(e.name):
             here.doubts.append(
-                f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
+                f"{e.title} never happened: {e.when!r} was true from the start, and the event occurs when it "
+                "becomes true"
             )
 
 
@@ -495,7 +496,7 @@ def refuse_contradictions(here: EventContext, every: Sequence[tuple[Event, Actio
             if first is not e and a != other:
                 raise SimulationError(
                     f"at t = {here.t:.9g} s actions contradict each other: {other.title} of {first.title} and "
-                    f"{a.title} of {e.title}; let one of the events come later, or once (times=1)",
+                    f"{a.title} of {e.title}; let one of the events happen later, or once (times=1)",
                     t=here.t,
                 )
 

@@ -114,7 +114,7 @@ def endless_events(n: InstantProblem, recent: Iterable[Sequence[int]], many: int
 def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) -> UnresolvedInstant:
     """Return the error for events of one guard, ``many`` so far, that accumulate at the time ``end``."""
     return UnresolvedInstant(
-        f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times, ever sooner after the last, "
+        f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times at decreasing intervals, "
         f"without end before t = {end:.6g} s",
         t=n.here.t,
     )
@@ -156,7 +156,7 @@ def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstan
     """Return the error for an instant that cannot be resolved in a finite number of rounds."""
     return UnresolvedInstant(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
-        f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
+        f"{', '.join(dict.fromkeys(names))}; each reverses the other",
         t=t,
     )
 

@@ -229,7 +229,7 @@ def body_sets(model: Model, scene: ContactTables, recorder: OutputRecorder) -> d
     return out
 
 
-INTERRUPTED_MESSAGE = "interrupted by the user at t = {:.6g} s; what was computed is kept"
+INTERRUPTED_MESSAGE = "interrupted by the user at t = {:.6g} s; the motion so far is kept"
 END_MESSAGE = "reached the end"
 
 

@@ -150,7 +150,7 @@ class ImplicitSolver:
         self._w = np.array([start.get(n, 0.0) for n in self.unknowns])
         found = self._newton(at, self._w)
         if found is None:
-            raise AnalysisError(f"no {', '.join(self.unknowns)} fulfil their equations at the start")
+            raise AnalysisError(f"no {', '.join(self.unknowns)} satisfy their equations at the start")
         self._at, (self._w, self._sign) = at, found
         if self._sign == 0.0:
             raise SingularityError(f"{', '.join(self.unknowns)} are not determined at the start: it is singular")

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 EQUATIONS = "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma"
 
 CALLING_CONVENTIONS = {
-    "c": "Arguments and results are arrays of double, matrices row by row; results have to be there. Nothing is kept "
-    "from one call to the next, so that threads may share them. Compile with a C99 compiler, link with -lm.",
+    "c": "Arguments and results are arrays of double, matrices row by row; results must be allocated by the caller. "
+    "The functions have no static data, so threads may share them. Compile with a C99 compiler, link with -lm.",
     "python": "Arguments are numbers and sequences; arrays of states have the states' own axes first, and so have the "
     "results. NumPy is all that is needed.",
     "casadi": "Functions of SX; they take numbers, SX and MX. Matrices are matrices, several of them are stacked. "

@@ -68,7 +68,7 @@ class Functions:
             "v": Argument("v", x.v, "velocities"),
             "vdot": Argument("vdot", eq.named_equations.vdot, "accelerations"),
             "lam": Argument("lam", x.lam, "multipliers"),
-            "loads": Argument("loads", x.loads, "what presses together the surfaces of joints with friction"),
+            "loads": Argument("loads", x.loads, "normal forces of joints with friction"),
             "places": Argument("places", places, "places of followers on their curves"),
             "u": Argument("u", u, "inputs", (0.0,) * len(u)),
             "p": Argument("p", p, "parameters", tuple(n.value for n in p)),
