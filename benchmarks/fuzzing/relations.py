@@ -60,7 +60,7 @@ class Base:
 def doubts(run: Any) -> list[str]:
     """What a result says against itself; that given velocities are not possible says nothing against the motion."""
     warned = getattr(getattr(run, "health", None), "warnings", ())
-    return [w for w in warned if "the nearest was taken" not in w]
+    return [w for w in warned if "the nearest possible velocity is used" not in w]
 
 
 def simulated(m: fb.Mechanism, t_end: float, times: Any, options: dict[str, Any], **other: Any) -> fb.Result:
@@ -232,7 +232,7 @@ def _method(name: str) -> Relation:
         try:
             return _again(b, b.mechanism, method=name)
         except fb.SimulationError as error:
-            if name == "radau" or "steps were taken by t =" not in str(error):
+            if name == "radau" or "steps were taken up to t =" not in str(error):
                 raise
             raise Unsupported("stiff: by explicit steps it takes too many") from error
 
