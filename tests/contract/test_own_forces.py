@@ -261,7 +261,9 @@ def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
         element(type("Breeze", (LinearDrag,), {"__module__": module, "__annotations__": {}}))
     m = thrown(LinearDrag.registry["Breeze"])
     m.save(tmp_path / "breeze.toml")
-    with pytest.raises(fb.ModelError, match=r"type 'Breeze' is defined by several modules, one, two; a file identifies"):
+    with pytest.raises(
+        fb.ModelError, match=r"type 'Breeze' is defined by several modules, one, two; a file identifies"
+    ):
         fb.load(tmp_path / "breeze.toml")
 
 

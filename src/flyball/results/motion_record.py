@@ -38,10 +38,12 @@ class MotionRecord:
         Numbers of the output times.
     solved : bool
         Whether the equations of motion had a solution wherever accelerations were checked.
+    deferred : bool
+        Whether the accelerations at other output times had not been computed.
     """
 
-    def __init__(self, rows: np.ndarray, solved: bool, written: PooledBuffer) -> None:
-        self.rows, self.solved, self._written = rows, solved, written
+    def __init__(self, rows: np.ndarray, solved: bool, deferred: bool, written: PooledBuffer) -> None:
+        self.rows, self.solved, self.deferred, self._written = rows, solved, deferred, written
 
     @cached_property
     def figures(self) -> RecordedFigures:
@@ -56,7 +58,7 @@ class MotionRecord:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the addresses that compiled code was given."""
-        return {"rows": self.rows, "solved": self.solved, "figures": self.figures}
+        return {name: getattr(self, name) for name in ("rows", "solved", "deferred", "figures")}
 
 
 def record_motion(result: Result, work: PooledBuffer | None = None, accelerations: bool = True) -> MotionRecord:
@@ -104,7 +106,7 @@ def record_motion(result: Result, work: PooledBuffer | None = None, acceleration
     if released.any():
         _remove_released(s, released, out.array("elastic"))
     solved = not stride or bool(np.isfinite(out.array("violation")[::stride]).all())
-    return MotionRecord(rows, solved, out)
+    return MotionRecord(rows, solved, deferred, out)
 
 
 def _pool(s: Structure, S: System, n: int, switched: bool) -> StructPool:
