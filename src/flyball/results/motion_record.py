@@ -12,7 +12,7 @@ import numpy as np
 
 from ..compiler.kernels import PooledBuffer, StructPool
 from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, no_output, pooled_work, struct_tables
-from ..engine.motion_record import RecordedFigures, record_motion_kernel
+from ..engine.recorded_figures import RecordedFigures, record_motion_kernel
 from ..forces import ENERGIES
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System
