@@ -248,7 +248,7 @@ def common_tolerance(b: Base, dice: random.Random) -> tuple:
 def bystanders(b: Base, dice: random.Random) -> tuple:
     """Events that do nothing, at the instants at which limits and other events happen."""
     if isinstance(b.options.get("method"), fb.Stepping):
-        raise Unsupported("steps by impulses know no events")
+        raise Unsupported("impulse time stepping does not support events")
     m = copy.deepcopy(b.mechanism)
     limits = [x for x in b.mechanism.elements() if isinstance(x, fb.Limit)]
     bounds = [(x.coordinate, y) for x in limits for y in (x.lower, x.upper) if y is not None]

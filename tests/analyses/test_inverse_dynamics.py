@@ -207,7 +207,7 @@ def test_reports_never_show_what_is_undetermined(tmp_path):
     assert float(first[head.index("upper.angle [N*m]")]) == pytest.approx(found.efforts["upper.angle"][0])
     assert "upper: tz 0 N m; undetermined: fx, fy, fz, tx, ty" in str(found)
     figure = found.plot()
-    assert "not drawn: upper fx, fy, fz, tx, ty; lower fx" in figure.get_supxlabel()
+    assert "not plotted: upper fx, fy, fz, tx, ty; lower fx" in figure.get_supxlabel()
     for ax in figure.axes:
         assert all("fz" not in line.get_label() for line in ax.lines)
 

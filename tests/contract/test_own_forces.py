@@ -310,7 +310,7 @@ def test_no_formula_at_all():
 
 
 def test_a_ball_in_the_air_comes_to_rest_on_a_floor():
-    """In steps by impulses; before it touches by the closed form, at rest its floor carries its weight."""
+    """In impulse time stepping; before it touches by the closed form, at rest its floor carries its weight."""
     m = fb.Mechanism("fall", gravity=(0, 0, -10), parameters={"c": C})
     m.add(
         fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 2)), fb.Ground("floor", shape=fb.Plane())

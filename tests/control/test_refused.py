@@ -201,7 +201,7 @@ def test_what_a_limited_controller_cannot_hold_is_told_with_and_without_states(g
     """3 N against 1 N at most: 2 N are left."""
     pid = fb.PID("pid", setpoint="0", measured="A.displacement", kp=100, lower=-1, upper=1, **gains)
     m = slide(pid, force="pid + 3").changed({"spring": None})
-    with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing holds against it"):
+    with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing balances this"):
         m.equilibrium()
 
 

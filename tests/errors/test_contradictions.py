@@ -89,7 +89,7 @@ def test_a_coordinate_that_no_freedom_moves():
 
 def test_an_axis_that_is_not_like_the_others():
     text = refused(driven(spatial((0, 1, 0.2)), motor=("A.angle", "2*t")))
-    assert "driver 'motor' finds nothing to move: the constraints of A, B, C, D leave no freedom" in text
+    assert "driver 'motor' has nothing to move: the constraints of A, B, C, D leave no freedom" in text
     assert "Counting leaves -2" in text
     assert "the axes of A, B, D are parallel, that of C is 11.3 deg off" in text
     assert spatial().simulate(0.01, outputs=2).health.freedoms == 1
@@ -97,7 +97,7 @@ def test_an_axis_that_is_not_like_the_others():
 
 def test_a_locked_triangle():
     text = refused(driven(triangle(), motor=("A.angle", "2*t")))
-    assert "driver 'motor' finds nothing to move: the constraints of A, B, C leave no freedom" in text
+    assert "driver 'motor' has nothing to move: the constraints of A, B, C leave no freedom" in text
     assert "counting joints leaves 0: it is a structure" in text
 
 

@@ -339,7 +339,7 @@ def test_a_driver_whose_speed_jumps(layer):
 def test_steps_by_impulses_know_none():
     m = slide()
     m.add(fb.Event("e", "t - 0.5"))
-    with pytest.raises(fb.ModelError, match="steps by impulses do not know Event 'e'; the adaptive"):
+    with pytest.raises(fb.ModelError, match="impulse time stepping does not support Event 'e'; the adaptive"):
         m.simulate(1, method="impulse")
 
 

@@ -103,7 +103,7 @@ UNFIT = [
         [fb.Lock("A"), fb.Release("A.angle")],
         r"Lock of 'A' and Release of 'A.angle' are both in do, and they contradict",
     ),
-    ([fb.Set("k", 1), fb.Set("k", 2)], r"Set of 'k' and Set of 'k' are both in do, and each is said once"),
+    ([fb.Set("k", 1), fb.Set("k", 2)], r"Set of 'k' and Set of 'k' are both in do, and each may be given once"),
     ([fb.Stop(), fb.Stop()], r"Stop and Stop are both in do"),
     (fb.Impulse("rod"), r"Impulse of 'rod': it is none; give impulse"),
     (fb.Impulse("rod", (1, 0, 0)), r"impulse needs 2 components, such as \(0, 1\), got"),

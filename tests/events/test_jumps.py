@@ -168,7 +168,7 @@ def test_start_beyond_a_limit_names_it():
     m = rods(ground=True)
     here = standing(rows(m, Row("knee", of=("B.angle",), kind=STOP, par=(0.2, 1.0))), "joint")
     with pytest.raises(
-        fb.ModelError, match=r"'knee'.*begins beyond it: B.angle is 0 rad and must be within 0.2 rad .* and 1 rad"
+        fb.ModelError, match=r"'knee'.*starts beyond it: B.angle is 0 rad and must be within 0.2 rad .* and 1 rad"
     ):
         resolve_start(here)
 

@@ -147,7 +147,7 @@ def test_a_tooth_that_holds(layer, teeth, fine):
     m.add(fb.Ratchet("pawl", "A.angle", teeth="n", tooth="first"))
     m.add(fb.Event("other", "t - 0.3", do=[fb.Set("n", teeth), fb.Set("first", 0 if fine else 0.05)]))
     if not fine:
-        refused(m, r"Ratchet 'pawl' instantaneously, by 0\.05 rad: it is held where no tooth is", layer)
+        refused(m, r"Ratchet 'pawl' instantaneously, by 0\.05 rad: it is locked between teeth", layer)
         return
     r = m.simulate(0.6, coordinates=layer)
     assert r["A.angle"] == pytest.approx(0.0, abs=1e-9)

@@ -57,7 +57,7 @@ def test_actions(made, said):
 
 def test_a_start_beyond_a_limit_tells_degrees():
     with pytest.raises(
-        ModelError, match=r"begins beyond it: A\.angle is 0 rad and must be at least 0\.174533 rad \(10 deg\)"
+        ModelError, match=r"starts beyond it: A\.angle is 0 rad and must be at least 0\.174533 rad \(10 deg\)"
     ):
         arm(fb.Limit("L", "A.angle", lower="10 deg")).simulate(1)
 

@@ -105,7 +105,7 @@ def test_what_a_method_does_not_have_is_refused_by_name():
 def test_nothing_to_stabilise():
     m = fb.Mechanism("stone", planar=True)
     m.add(fb.Body("b", mass=1, inertia=1))
-    with pytest.raises(fb.ModelError, match=r"does nothing: no constraint is left to be kept; leave it out$"):
+    with pytest.raises(fb.ModelError, match=r"has no effect: there are no constraints to stabilise; leave it out$"):
         m.simulate(1.0, coordinates="absolute", stabilization="none")
 
 

@@ -83,9 +83,11 @@ def test_what_is_no_choice_is_refused(wish):
 @pytest.mark.parametrize("wish", [True, False])
 def test_steps_by_impulses_have_no_choice(wish):
     m = example("conveyor.toml")
-    with pytest.raises(fb.ModelError, match=rf"^specialize={wish} does nothing with steps by impulses; leave it out"):
+    with pytest.raises(
+        fb.ModelError, match=rf"^specialize={wish} does nothing with impulse time stepping; leave it out"
+    ):
         m.simulate(0.1, specialize=wish, method="impulse")
-    with pytest.raises(fb.ModelError, match="specialize= is not known to steps by impulses"):
+    with pytest.raises(fb.ModelError, match="specialize= is not known to impulse time stepping"):
         m.simulate(0.1, specialize=wish)
 
 

@@ -247,7 +247,7 @@ INTEGRATOR_DEFAULTS = {
     "rho_inf": None,
 }  # fmt: skip
 """Integration options without effect on impulse time stepping, with their defaults."""
-IMPULSE_STEPPING = "steps by impulses"
+IMPULSE_STEPPING = "impulse time stepping"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -351,7 +351,7 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
         raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
-            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave "
+            f"{IMPULSE_STEPPING} uses absolute coordinates, where joints close to rounding; leave "
             "coordinates out"
         )
     return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as requested")
@@ -366,7 +366,7 @@ def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
         parts.append("index 3: velocities are not projected on the constraints")
     if not (touch or parts or o.method in IMPLICIT_METHODS):
         return ""
-    return ", ".join([f"{o.method}, as requested", *parts]) + (": from touch to touch" if touch else "")
+    return ", ".join([f"{o.method}, as requested", *parts]) + (": event-driven" if touch else "")
 
 
 def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
@@ -387,12 +387,12 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
         return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {cannot}")
     if asking:
         return MethodChoice(
-            adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch: {asking[0]} is not known to {IMPULSE_STEPPING}"
+            adaptive, f"{DEFAULT_INTEGRATOR}, event-driven: {IMPULSE_STEPPING} does not support {asking[0]}"
         )
     why = too_many_contacts(model, o.parameters) or _continues_impulse_stepping(o.start)
     if why:
         return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {why}")
-    return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch", _impulse_options(o))
+    return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, event-driven", _impulse_options(o))
 
 
 def _unknown_to_impulse_stepping(model: Model) -> list[str]:
@@ -427,4 +427,4 @@ def is_unresolved(error: BaseException) -> bool:
 def reason_for_impulses(error: BaseException) -> str:
     """Return the health remark on why impulse time stepping replaced the integration."""
     found = error.__cause__ if isinstance(error.__cause__, UnresolvedInstant) else error
-    return f"{IMPULSE_STEPPING}, since from touch to touch it does not go: {found}"
+    return f"{IMPULSE_STEPPING}, since event-driven integration failed: {found}"

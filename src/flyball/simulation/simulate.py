@@ -231,7 +231,7 @@ def _refuse_idle_stabilization(start: InitialState, stabilization: str) -> None:
         joint = len(start.base.compiled.values.system.rows.law) > 0
         where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
         raise ModelError(
-            f"stabilization={stabilization!r} does nothing: {where}there are no constraints to stabilise; leave it "
+            f"stabilization={stabilization!r} has no effect: {where}there are no constraints to stabilise; leave it "
             f"out{remedy}"
         )
 

@@ -363,7 +363,7 @@ def _contact_equilibrium_result(
         own,
         stability=kind,
         unbalanced=found.unbalanced,
-        method="steps of impulses" + (", then Newton's method" if smooth_result else ""),
+        method="impulse time stepping" + (", then Newton's method" if smooth_result else ""),
         parameters=dict(c.parameters),
         result=result,
         assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),

@@ -261,7 +261,7 @@ def make_impulse_result(
         seconds=time.perf_counter() - since,
         compiling=compiled_since(since),
         options={"method": dataclasses.asdict(o)},
-        coordinates="absolute: steps of impulses",
+        coordinates="absolute: impulse time stepping",
         remarks=contact_warnings(model),
         crowd=sum(b.count for b in model.bulk),
         contact=contact,
