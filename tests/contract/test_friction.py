@@ -344,7 +344,7 @@ def test_a_second_friction_on_one_surface_is_refused():
         m.add(block, joint("table", "ground", "block", at=(0, 0, 0), axis=(0, 0, 1)))
         m.add(fb.JointFriction("f", "table", static=0.3, **first))
         with pytest.raises(
-            fb.ModelError, match=r"JointFriction 'g': JointFriction 'f' acts on the surface of \w+ 'table'"
+            fb.ModelError, match=r"JointFriction 'g': JointFriction 'f' already acts on the surface of \w+ 'table'"
         ):
             m.add(fb.JointFriction("g", "table", static=0.3, **second))
         m.add(fb.JointFriction("seal", "table", static=0.1, preload=5, **first))
