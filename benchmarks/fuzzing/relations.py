@@ -60,7 +60,7 @@ class Base:
 def doubts(run: Any) -> list[str]:
     """What a result says against itself; that given velocities are not possible says nothing against the motion."""
     warned = getattr(getattr(run, "health", None), "warnings", ())
-    return [w for w in warned if "the nearest was taken" not in w]
+    return [w for w in warned if "the nearest possible velocity is used" not in w]
 
 
 def simulated(m: fb.Mechanism, t_end: float, times: Any, options: dict[str, Any], **other: Any) -> fb.Result:
@@ -232,7 +232,7 @@ def _method(name: str) -> Relation:
         try:
             return _again(b, b.mechanism, method=name)
         except fb.SimulationError as error:
-            if name == "radau" or "steps were taken by t =" not in str(error):
+            if name == "radau" or "steps were taken up to t =" not in str(error):
                 raise
             raise Unsupported("stiff: by explicit steps it takes too many") from error
 
@@ -248,7 +248,7 @@ def common_tolerance(b: Base, dice: random.Random) -> tuple:
 def bystanders(b: Base, dice: random.Random) -> tuple:
     """Events that do nothing, at the instants at which limits and other events happen."""
     if isinstance(b.options.get("method"), fb.Stepping):
-        raise Unsupported("steps by impulses know no events")
+        raise Unsupported("impulse time stepping does not support events")
     m = copy.deepcopy(b.mechanism)
     limits = [x for x in b.mechanism.elements() if isinstance(x, fb.Limit)]
     bounds = [(x.coordinate, y) for x in limits for y in (x.lower, x.upper) if y is not None]
@@ -336,7 +336,7 @@ def reorder(b: Base, dice: random.Random) -> tuple:
 
 def swap(b: Base, dice: random.Random) -> tuple:
     if b.mechanism.assemble().moved:  # it closes near the drawing; frames on the other body close as near, elsewhere
-        raise Unsupported("a start that is not closed as drawn")
+        raise Unsupported("a start that is not closed in the reference configuration")
     return _again(b, changes.swapped(b.mechanism))
 
 

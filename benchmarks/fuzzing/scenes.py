@@ -1,4 +1,4 @@
-"""Random contact scenes: from touch to touch, or in steps by impulses."""
+"""Random contact scenes: from touch to touch, or in impulse time stepping."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def sliding(d: Dice) -> Case:
 
 
 def piled(d: Dice) -> Case:
-    """Several balls and boxes in steps by impulses."""
+    """Several balls and boxes in impulse time stepping."""
     case, m = _space(d, "piled", 0.3, method=_steps(d.pick([1e-3, 2e-3, 5e-3])))
     _floor(d, m)
     for k in range(d.whole(2, 6)):
@@ -243,7 +243,7 @@ def jointed(d: Dice) -> Case:
 
 
 def soft(d: Dice) -> Case:
-    """Contacts that give way, in steps by impulses."""
+    """Contacts that give way, in impulse time stepping."""
     case, m = _space(d, "soft", 0.4, method=_steps(2e-4))
     _floor(d, m)
     r = 0.1
@@ -389,7 +389,7 @@ SCENES = {
 
 
 def made(family: str, seed: int) -> Case:
-    """The scene of a family and a seed: planar for even seeds; one in three in steps by impulses."""
+    """The scene of a family and a seed: planar for even seeds; one in three in impulse time stepping."""
     d = Dice(f"{family} {seed}", planar=seed % 2 == 0)
     case = SCENES[family](d)
     if "method" not in case.options and seed % 3 == 2:

@@ -16,7 +16,7 @@ from .physics import ANGULAR, BALANCED, DRIFT, SLOW, Finding, constraints, energ
 from .poses import Array, Motion, spatial
 
 OVERLAP = 1e-6  # of the size, from touch to touch
-OVERLAP_STEPS = 5e-3  # of the size, in steps by impulses
+OVERLAP_STEPS = 5e-3  # of the size, in impulse time stepping
 CONE = 1e-6  # of the largest contact force
 CONE_STEPS = 1e-4
 SLIDES = 1e-3  # of the fastest speed: what slides faster has friction against its slip
@@ -28,7 +28,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 def by_steps(x: Motion) -> bool:
     """Whether the motion was stepped by impulses."""
-    return str(x.run.health.method).startswith("steps by impulses")
+    return str(x.run.health.method).startswith("impulse time stepping")
 
 
 def corners(x: Motion, name: str, edges: Any) -> Array:

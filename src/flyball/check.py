@@ -175,7 +175,7 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobil
     freedoms = m.freedoms
     # in a locked mechanism every driver is redundant
     if model.drivers and freedoms == 0 and m.redundancy and _locked(model):
-        yield "no freedom is left even without the drivers: it is locked as it is drawn and will not move"
+        yield "no freedom is left even without the drivers: the mechanism is locked in the reference configuration"
     elif model.drivers and freedoms == 0:
         yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"
     elif freedoms == 0 and not model.bulk:

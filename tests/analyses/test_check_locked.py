@@ -19,7 +19,7 @@ def triangle(law="0", length=0.5):
 
 def test_a_locked_loop_with_a_driver_is_called_locked():
     said = " ".join(triangle().check().warnings)
-    assert "no freedom is left even without the drivers: it is locked" in said
+    assert "no freedom is left even without the drivers: the mechanism is locked" in said
     assert "drivers take every freedom" not in said
 
 

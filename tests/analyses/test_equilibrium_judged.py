@@ -114,8 +114,8 @@ def test_nothing_stiff_or_free_beside_it_hides_flutter_or_makes_it_up():
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        ({"turning": ["vertical.angle"], "stable": True}, "no hill to go down"),
-        ({"turning": ["vertical.angle"], "preload": ["push.x"]}, "holds a mechanism at rest"),
+        ({"turning": ["vertical.angle"], "stable": True}, "which a steady motion does not have"),
+        ({"turning": ["vertical.angle"], "preload": ["push.x"]}, "is for a mechanism at rest"),
         ({"stable": True, "preload": ["push.x"]}, "give one of the two"),
     ],
 )

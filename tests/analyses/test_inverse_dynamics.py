@@ -207,7 +207,7 @@ def test_reports_never_show_what_is_undetermined(tmp_path):
     assert float(first[head.index("upper.angle [N*m]")]) == pytest.approx(found.efforts["upper.angle"][0])
     assert "upper: tz 0 N m; undetermined: fx, fy, fz, tx, ty" in str(found)
     figure = found.plot()
-    assert "not drawn: upper fx, fy, fz, tx, ty; lower fx" in figure.get_supxlabel()
+    assert "not plotted: upper fx, fy, fz, tx, ty; lower fx" in figure.get_supxlabel()
     for ax in figure.axes:
         assert all("fz" not in line.get_label() for line in ax.lines)
 
@@ -221,7 +221,7 @@ def test_wrong_motions_are_refused_by_name():
         ({"speed": "t"}, "only positions and angles"),
         ({"shoulder.angle": [1.0, 2.0]}, "2 samples do not fit 11 times"),
         ({"shoulder.angle": ([0, 0.2, 0.1, 1], [0, 1, 2, 3])}, "ascend"),
-        ({"shoulder.angle": ([0, 0.2, 0.3, 0.5], [0, 1, 2, 3])}, "reach from 0 s to 0.5 s"),
+        ({"shoulder.angle": ([0, 0.2, 0.3, 0.5], [0, 1, 2, 3])}, "extend from 0 s to 0.5 s"),
         ({"shoulder.angle": ([0, 0.5, 1], [0, 1, 2])}, "3 samples make no smooth motion"),
         ({"shoulder.angle": {"a": 1}}, "give an expression of t"),
         ({"shoulder.angle": "sin(x)"}, "x"),

@@ -86,7 +86,7 @@ def test_friction_under_reactions_that_nobody_knows_is_refused():
 
 def test_friction_in_motion_is_asked_about_a_motion():
     """Where a mechanism is described in motion nobody says what sticks: a motion does."""
-    said = r"linearize with JointFriction 'bearing' is about rest, and 'shaft' moves: .*about=m.simulate"
+    said = r"linearize with JointFriction 'bearing' is made about a position of rest, and 'shaft' moves: .*about=m.simulate"
     with pytest.raises(fb.ModelError, match=said):
         coaxial().linearize(frozen=True)
 
@@ -104,6 +104,6 @@ def test_about_a_motion_what_slides_goes_on_sliding():
     run = m.simulate(0.1, outputs=2)
     assert m.modes(about=run, frozen=True).omega == pytest.approx([2.0], rel=1e-9)
     found = m.linearize(["load.x", "load.y"], ["sled.x", "sled.vx"], about=run, frozen=True)
-    assert "taken to slide on" in " ".join(found.notes)
+    assert "assumed to keep sliding" in " ".join(found.notes)
     assert found.B[-1] == pytest.approx([0.5, 0.1 / 2], abs=1e-12)  # lifting takes mu F off the friction
     assert np.linalg.eigvals(found.A).imag.max() == pytest.approx(2.0, rel=1e-9)

@@ -228,7 +228,7 @@ def test_where_the_search_for_cures_is_cut_it_says_so(monkeypatch):
     monkeypatch.setattr(remedies, "MAX_TESTS_PER_SET", 0)
     (only,) = door().mobility().sets
     assert only.cure is None
-    assert only.advice == "no cure by another joint was found; the search was cut after 0 choices"
+    assert only.advice == "no remedy by another joint was found; the search was cut after 0 choices"
     assert only.as_dict()["search_cut"] == only.cut
 
 

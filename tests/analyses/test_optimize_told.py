@@ -17,7 +17,7 @@ def spring(k=100.0):
 def test_a_zero_slope_is_not_called_found():
     found = spring().optimize(["b.y"], ["other"], target=[-0.2], analysis="equilibrium")
     assert not found.success
-    assert "every derivative is zero where it begins" in found.message
+    assert "every derivative is zero at the start" in found.message
 
 
 def test_the_reason_is_told_in_our_words():

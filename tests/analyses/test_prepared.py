@@ -128,7 +128,7 @@ def test_wrong_arguments_are_refused():
         p.pose("A", p.q)
     with pytest.raises(ValueError, match="read-only"):
         p.q[0] = 1.0
-    with pytest.raises(fb.ModelError, match="'q' cannot be set: what is prepared does not change"):
+    with pytest.raises(fb.ModelError, match="'q' cannot be set: a prepared mechanism is constant"):
         p.q = np.ones(2)
     p.parameters["m"] = 5.0
     assert p.parameters == {"m": 3.0}

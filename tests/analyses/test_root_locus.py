@@ -186,5 +186,5 @@ def test_the_text_says_what_happens():
     text = str(m.root_locus("k", [0, 10]))
     assert "k = 4.905, imaginary part 0 rad/s: divergence, 1 fewer unstable" in text
     run = m.simulate(0.1)
-    with pytest.raises(fb.ModelError, match="say either about or equilibrium=True"):
+    with pytest.raises(fb.ModelError, match="give either about or equilibrium=True"):
         m.root_locus("k", [6, 10], about=run, equilibrium=True)

@@ -188,9 +188,9 @@ def test_optimisation_asks_for_sense():
     with pytest.raises(fb.ModelError, match=r"does not fit slider\.x, slider\.vx"):
         m.optimize(["slider.x", "slider.vx"], ["r"], target=[0.3])
     assert m.optimize(["slider.x"], ["l"], target=["80 cm"]).parameters["l"] == pytest.approx(0.6)
-    with pytest.raises(fb.ModelError, match="say which quantities"):
+    with pytest.raises(fb.ModelError, match="give the quantities"):
         m.sensitivity([], ["r"])
     with pytest.raises(fb.ModelError, match="no parameter 'rr'"):
         m.optimize(["slider.x"], ["rr"], target=[0.6])
-    with pytest.raises(fb.ModelError, match=r"'r' begins at 0.2, outside its bound 0.3"):
+    with pytest.raises(fb.ModelError, match=r"'r' starts at 0.2, outside its bound 0.3"):
         m.optimize(["slider.x"], {"r": (0.3, 0.4)}, target=[0.6])

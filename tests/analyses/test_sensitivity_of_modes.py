@@ -58,7 +58,7 @@ def test_frequencies_that_veer():
 
 
 def test_critical_damping_has_no_derivative():
-    with pytest.raises(fb.SingularityError, match=r"-10\+0j 1/s is 2-fold .* no derivative by 'k2'"):
+    with pytest.raises(fb.SingularityError, match=r"-10\+0j 1/s is 2-fold .* no derivative with respect to 'k2'"):
         carts(50.0, 100.0, damping=20.0).sensitivity(to=["k2"], analysis="modes")
 
 
@@ -99,7 +99,7 @@ def test_critical_damping_is_told_apart_from_what_moves_away():
     m = carts(50.0, 100.0, damping=20.0)
     m.add(fb.Body("free", mass=1, inertia=1, position=(0, 3)))
     m.add(fb.Translational("rail", "ground", "free", at=(0, 3), axis=(1, 0)))
-    with pytest.raises(fb.SingularityError, match="no derivative by 'k2'"):
+    with pytest.raises(fb.SingularityError, match="no derivative with respect to 'k2'"):
         m.sensitivity(to=["k2"], analysis="modes")
 
 

@@ -271,7 +271,7 @@ def test_andrews_squeezing_mechanism(coordinates):
 
 def test_what_is_asked_in_vain_is_refused():
     m = damped()
-    with pytest.raises(fb.ModelError, match="coordinates are those of a motion"):
+    with pytest.raises(fb.ModelError, match="coordinates apply to a motion"):
         m.sensitivity(["mass.x"], coordinates="joint")
     with pytest.raises(fb.ModelError, match="unknown coordinates 'joints'"):
         m.sensitivity(["mass.x"], analysis="motion", t_end=1, coordinates="joints")

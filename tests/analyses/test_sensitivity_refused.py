@@ -19,7 +19,7 @@ def cart(law: str) -> fb.Mechanism:
 
 @pytest.mark.parametrize("law", ["where(x > 0.5, -F, 0)", "-F*sign(x - 0.5)", "where(t > 0.1 and x >= 0.5, F, 0)"])
 def test_a_law_that_jumps_at_a_place_is_refused(law):
-    with pytest.raises(fb.ModelError, match=r"'push'.* decides by 'x'.* Write what is smooth.*step\("):
+    with pytest.raises(fb.ModelError, match=r"'push'.* decides by 'x'.* Write a smooth law.*step\("):
         cart(law).sensitivity(["cart.vx"], ["v0"], analysis="motion", t_end=0.8)
 
 

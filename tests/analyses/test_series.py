@@ -233,5 +233,5 @@ def test_a_locus_that_stops_keeps_what_it_has() -> None:
     ) as caught:
         lever().root_locus("P", [0.0, 1.0])
     assert caught.value.series.eigenvalues.shape == (1, 2)
-    with pytest.raises(fb.ModelError, match="say equilibrium=True"):
+    with pytest.raises(fb.ModelError, match="give equilibrium=True"):
         lever().root_locus("P", [0.0, 1.0], about=lever().equilibrium())

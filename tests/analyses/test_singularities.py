@@ -231,7 +231,7 @@ def test_rolling_is_refused():
     m = example("chaplygin_sleigh.toml")
     m.initial.clear()
     m.add(fb.Driver("push", f"{m.bodies[0].name}.x", "t"))
-    with pytest.raises(fb.ModelError, match="restrain velocities only"):
+    with pytest.raises(fb.ModelError, match="constrain velocities only"):
         m.singularities("push", (0, 1))
 
 

@@ -18,7 +18,7 @@ def test_text(press):
     text = str(press)
     assert "driver" in text
     assert "bifurcation; motions: 2 for a' = 1" in text
-    assert "free with the driver held" in text
+    assert "free while the driver is at rest" in text
     assert len(press.table().splitlines()) == 1 + len(press)
 
 

@@ -56,7 +56,7 @@ def test_values_are_real(analysis, values):
 @pytest.mark.parametrize("analysis", ["root_locus", "equilibria"])
 def test_what_is_varied_is_not_given_as_well(analysis):
     ask = getattr(slider("-k*value", parameters={"k": 1.0}), analysis)
-    with pytest.raises(fb.ModelError, match="'k' goes through its values, so parameters cannot hold it at 7"):
+    with pytest.raises(fb.ModelError, match="'k' takes all its values, so parameters cannot fix it at 7"):
         ask("k", [1, 2], parameters={"k": 7})
-    with pytest.raises(fb.ModelError, match="'t' goes through its values, so t cannot hold it at 5"):
+    with pytest.raises(fb.ModelError, match="'t' takes all its values, so t cannot fix it at 5"):
         ask("t", [1, 2], t=5)

@@ -49,7 +49,7 @@ def test_contradictory_drivers():
     assert {"one", "two"} & set(caught.value.gaps)
     m = four_bar()
     m.add(fb.Driver("one", "A.angle", "t"), fb.Driver("two", "A.angle", "2*t"))
-    with pytest.raises(fb.AssemblyError, match="no velocities fulfil all constraints") as caught:
+    with pytest.raises(fb.AssemblyError, match="no velocities satisfy all constraints") as caught:
         assemble(m)
     assert {"one", "two"} <= set(caught.value.gaps)
 

@@ -101,7 +101,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, monkeypatch):
     m, path = double_pendulum(), tmp_path / "run.nc"
     cut(monkeypatch)
     run = m.simulate(4, checkpoint=tmp_path / "whole.nc")
-    with pytest.raises(fb.Interrupted, match="from where the same call goes on") as ended:
+    with pytest.raises(fb.Interrupted, match="the same call continues from there") as ended:
         m.simulate(4, checkpoint=path, progress=stop)
     broken = ended.value.result
     assert not broken.health.success
@@ -140,7 +140,7 @@ def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
     assert_same(broken, kept)
     t = kept.final[0]
     assert 4 * sent[0] <= t < 4 * sent[0] + 0.5
-    assert f"{path} holds it to t = {t:.6g} s" in broken.health.message
+    assert f"{path} contains it to t = {t:.6g} s" in broken.health.message
     begun = []
     run = m.simulate(4, checkpoint=path, progress=begun.append)
     assert begun[0] >= sent[0]

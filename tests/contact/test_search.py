@@ -231,7 +231,7 @@ def test_a_pose_that_is_no_number_is_named():
 def test_too_many_in_one_place_are_refused():
     n = 60_000
     F = ContactFinder(geometry(np.full(n, 0.1)))
-    with pytest.raises(ModelError, match=r"too many shapes are in one place: .* shape \d+ alone; move bodies"):
+    with pytest.raises(ModelError, match=r"too many shapes are close together: .* shape \d+ alone; move bodies"):
         F.find(moving(np.zeros((n, 3))))
 
 

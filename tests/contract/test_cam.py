@@ -174,5 +174,7 @@ def test_ends_of_profiles_are_checked():
     m.add(fb.Body("bead", mass=1, inertia=1))
     with pytest.raises(fb.ModelError, match=r"beyond= has no effect on a closed profile"):
         m.add(closed)
-    with pytest.raises(fb.ModelError, match=r"its follower is drawn beyond an end of the profile"):
+    with pytest.raises(
+        fb.ModelError, match=r"in the reference configuration its follower is beyond an end of the profile"
+    ):
         m.add(fb.Cam("wire", "ground", "bead", points=[(0, 0), (1, 0.1), (2, 0.1), (3, 0)], at=(3.2, 0), closed=False))

@@ -360,7 +360,7 @@ def test_an_interrupt_waits_for_compiled_code():
 
 
 def test_addresses_stay_in_their_process():
-    with pytest.raises(TypeError, match="'pull' stands at an address of this process"):
+    with pytest.raises(TypeError, match="'pull' is at an address of this process"):
         pickle.dumps(Law(pull).functions)
 
 

@@ -261,12 +261,14 @@ def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
         element(type("Breeze", (LinearDrag,), {"__module__": module, "__annotations__": {}}))
     m = thrown(LinearDrag.registry["Breeze"])
     m.save(tmp_path / "breeze.toml")
-    with pytest.raises(fb.ModelError, match=r"type 'Breeze' is defined by several modules, one, two; a file knows"):
+    with pytest.raises(
+        fb.ModelError, match=r"type 'Breeze' is defined by several modules, one, two; a file identifies"
+    ):
         fb.load(tmp_path / "breeze.toml")
 
 
 def test_a_name_of_flyballs_own_is_refused():
-    with pytest.raises(fb.ModelError, match=r"the class Rope of .*test_own_forces.*give the class of your own another"):
+    with pytest.raises(fb.ModelError, match=r"the class Rope of .*test_own_forces.*give your own class another"):
 
         class Rope(BodyForce):
             """Taken."""
@@ -285,7 +287,7 @@ WRONG = {
         {"wrench": staticmethod(lambda par, F, M, laws, values: print(par))},
         "Variant.wrench cannot be compiled for floats",
     ),
-    "a field that means something": ({"__annotations__": {"load": float}, "load": 1.0}, "load has a meaning for every"),
+    "a field that means something": ({"__annotations__": {"load": float}, "load": 1.0}, "load is reserved for every"),
 }
 
 
@@ -308,7 +310,7 @@ def test_no_formula_at_all():
 
 
 def test_a_ball_in_the_air_comes_to_rest_on_a_floor():
-    """In steps by impulses; before it touches by the closed form, at rest its floor carries its weight."""
+    """In impulse time stepping; before it touches by the closed form, at rest its floor carries its weight."""
     m = fb.Mechanism("fall", gravity=(0, 0, -10), parameters={"c": C})
     m.add(
         fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 2)), fb.Ground("floor", shape=fb.Plane())

@@ -125,7 +125,5 @@ def test_names_and_steps():
             runge_kutta(name, **METHODS["heun"])
     with pytest.raises(fb.ModelError, match="there is another method of that name"):
         runge_kutta("heun", **METHODS["classical"])
-    with pytest.raises(
-        fb.ModelError, match="method='classical' has no estimate of its error: give the width of its steps"
-    ):
+    with pytest.raises(fb.ModelError, match="method='classical' does not estimate its error: give the step size"):
         pendulum().simulate(0.1, method="classical")

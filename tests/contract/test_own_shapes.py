@@ -256,7 +256,7 @@ def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
     m.add(fb.Body("b", shape=Pebble.registry["Cobble"](semi_axes=HALF), mass=1, inertia=(1, 1, 1)))
     m.save(tmp_path / "cobble.toml")
     with pytest.raises(
-        fb.ModelError, match=r"'b'.*type 'Cobble' is defined by several modules, one, two; a file knows"
+        fb.ModelError, match=r"'b'.*type 'Cobble' is defined by several modules, one, two; a file identifies"
     ):
         fb.load(tmp_path / "cobble.toml")
 

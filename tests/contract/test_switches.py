@@ -148,7 +148,7 @@ def test_pin_refuses_a_start_with_a_velocity_across_it():
     m = blocks(lambda L, M, T: fb.ShearPin("part", "P.displacement", strength=100.0))
     m.add(fb.Initial("P.displacement", rate=1.0))
     with pytest.raises(
-        fb.ModelError, match=r"ShearPin 'part': the motion begins beyond it: the rate of .* must be zero"
+        fb.ModelError, match=r"ShearPin 'part': the motion starts beyond it: the rate of .* must be zero"
     ):
         m.simulate(1.0)
 

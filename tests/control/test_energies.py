@@ -119,5 +119,5 @@ def test_laws_that_name_controllers_are_refused_as_the_user_wrote_them():
         m.sensitivity(["A.angle"], ["kp"], analysis="motion", t_end=0.1)
     m = arm(anti_windup="back-calculation")
     m.replace(fb.PID("pid", setpoint="where(A.angle > 0.3, r, 1)", measured="A.angle", kp="kp", ki=20))
-    with pytest.raises(ModelError, match=r"PID 'pid': the rate of 'pid.integral' decides by 'A.angle'.*Write what is"):
+    with pytest.raises(ModelError, match=r"PID 'pid': the rate of 'pid.integral' decides by 'A.angle'.*Write a smooth"):
         m.sensitivity(["A.angle"], ["kp"], analysis="motion", t_end=0.1)

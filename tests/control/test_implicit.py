@@ -85,5 +85,5 @@ def test_what_senses_one_body_and_pushes_another():
 
 
 def test_who_says_no():
-    with pytest.raises(fb.ModelError, match=r"variational.*does not know PID 'pid'"):
+    with pytest.raises(fb.ModelError, match=r"variational.*does not support PID 'pid'"):
         slide(pid()).simulate(1, method="variational", step=1e-3)

@@ -60,7 +60,7 @@ def test_what_is_printed_is_consistent(period, said):
     assert told["equilibrium"].startswith(f"stable by the {said} of the closed loop")
     assert "least stiffness" not in told
     assert (e.least < 0.0) == (period is not None)
-    assert told["least stiffness with controllers' states held"].startswith(f"{e.least:.3g} of what acts")
+    assert told["least stiffness with constant controllers' states"].startswith(f"{e.least:.3g} of what acts")
     assert e.as_dict()["judged_by"].startswith(said)
 
 
@@ -85,7 +85,7 @@ def test_series_goes_to_a_limit_and_on():
     assert series.stability == ("stable", "stable", "marginal")
     (jump,) = series.jumps
     assert 2.0 <= jump.value <= 3.0
-    assert "held stiffness" in series.lines()[0][1]
+    assert "stiffness with constant controllers" in series.lines()[0][1]
     with pytest.raises(fb.ModelError, match="stable= is for mechanisms without controllers"):
         m.equilibria("most", values, stable=True)
 
@@ -111,5 +111,5 @@ def test_of_two_rests_that_where_the_motion_ended():
     e, other = m.equilibrium(t=20, start=run), m.equilibrium(t=20)
     assert e["A.angle"] == pytest.approx(run["A.angle"][-1], abs=0.1)  # it swings a little still
     assert e["A.angle"] > 0.5 and other["A.angle"] < -0.5
-    with pytest.raises(fb.ModelError, match="another one"):
+    with pytest.raises(fb.ModelError, match="a different one"):
         servo().equilibrium(start=run)

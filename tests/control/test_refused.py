@@ -61,7 +61,7 @@ def test_names():
         m.add(fb.Lag("k", of="1", time=1))
     with pytest.raises(fb.ModelError, match="D is 1 x 1; of 0 states, 2 inputs and 1 outputs it must be 1 x 2"):
         m.add(fb.StateSpace("K", inputs=["1", "t"], D=3))
-    with pytest.raises(fb.ModelError, match="what differentiates has no states"):
+    with pytest.raises(fb.ModelError, match="a transfer function that differentiates has no state-space form"):
         m.add(fb.Transfer("D", of="1", num=[1, 0], den=[1]))
 
 
@@ -201,7 +201,7 @@ def test_what_a_limited_controller_cannot_hold_is_told_with_and_without_states(g
     """3 N against 1 N at most: 2 N are left."""
     pid = fb.PID("pid", setpoint="0", measured="A.displacement", kp=100, lower=-1, upper=1, **gains)
     m = slide(pid, force="pid + 3").changed({"spring": None})
-    with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing holds against it"):
+    with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing balances this"):
         m.equilibrium()
 
 

@@ -63,8 +63,8 @@ def test_two_drivers_of_one_freedom():
     c, s = 0.2 * np.cos(0.3), 0.2 * np.sin(0.3)
     slope = -s * (1 + c / np.sqrt(0.25 - s * s))
     assert "driver 'one' and driver 'two' move the same freedom through A, B, C, P and disagree" in text
-    assert f"one asks for 2 rad/s where the rest gives {0.1 / slope:.6g}" in text
-    assert f"two asks for 0.1 m/s where the rest gives {2 * slope:.6g}" in text
+    assert f"one prescribes 2 rad/s where the other constraints give {0.1 / slope:.6g}" in text
+    assert f"two prescribes 0.1 m/s where the other constraints give {2 * slope:.6g}" in text
     assert "A, B" not in refused(driven(crank(), one=("A.angle", "2*t"), two=("A.angle", "3*t")))
     m = driven(crank(), one=("A.angle", "2*t"))
     m.add(fb.Initial("P.displacement", rate=0.1))
@@ -74,21 +74,22 @@ def test_two_drivers_of_one_freedom():
 @pytest.mark.parametrize("law", ["-0.1*t", "-0.1*t**2"])
 def test_a_start_at_a_dead_centre(law):
     text = refused(driven(crank(0.0), push=("P.displacement", law)))
-    assert "driver 'push' asks for a motion of 'P.displacement' at a dead centre" in text
-    assert "in this position A.angle moves it by nothing, next to it it does" in text
-    assert "ask for a motion of A.angle" in text
+    assert "driver 'push' prescribes a motion of 'P.displacement' at a dead centre" in text
+    assert "in this position A.angle does not change it, at neighbouring positions it does" in text
+    assert "prescribe a motion of A.angle" in text
 
 
 def test_a_coordinate_that_no_freedom_moves():
     text = refused(driven(crank(), lift=("slider.y", "0.1*t")))
     assert (
-        "driver 'lift' asks for a motion of 'slider.y', which no freedom moves, here or nearby; free is A.angle" in text
+        "driver 'lift' prescribes a motion of 'slider.y', which no freedom changes, here or nearby; free is A.angle"
+        in text
     )
 
 
 def test_an_axis_that_is_not_like_the_others():
     text = refused(driven(spatial((0, 1, 0.2)), motor=("A.angle", "2*t")))
-    assert "driver 'motor' finds nothing to move: the constraints of A, B, C, D leave no freedom" in text
+    assert "driver 'motor' has nothing to move: the constraints of A, B, C, D leave no freedom" in text
     assert "Counting leaves -2" in text
     assert "the axes of A, B, D are parallel, that of C is 11.3 deg off" in text
     assert spatial().simulate(0.01, outputs=2).health.freedoms == 1
@@ -96,14 +97,17 @@ def test_an_axis_that_is_not_like_the_others():
 
 def test_a_locked_triangle():
     text = refused(driven(triangle(), motor=("A.angle", "2*t")))
-    assert "driver 'motor' finds nothing to move: the constraints of A, B, C leave no freedom" in text
+    assert "driver 'motor' has nothing to move: the constraints of A, B, C leave no freedom" in text
     assert "counting joints leaves 0: it is a structure" in text
 
 
 def test_drivers_that_disagree_later():
     """At the start neither asks for anything; the first acceleration tells them apart."""
     text = refused(driven(crank(), one=("A.angle", "t**2"), two=("A.angle", "2*t**2")))
-    assert "one asks for 2 rad/s^2 where the rest gives 4; two asks for 4 rad/s^2 where the rest gives 2" in text
+    assert (
+        "one prescribes 2 rad/s^2 where the other constraints give 4; two prescribes 4 rad/s^2 where the other constraints give 2"
+        in text
+    )
 
 
 def test_drivers_that_part_slowly():

@@ -84,7 +84,7 @@ def test_units(text, dimension, says):
         ("2*", ["cannot read the expression", "    2*\n"]),
         ("", ["empty", "'5 mm'"]),
         ("2x*3", ["cannot read", "2*x"]),
-        ("k*30 deg", ["cannot read", "stands in parentheses"]),
+        ("k*30 deg", ["cannot read", "must be in parentheses"]),
         ("lambda", ["cannot read"]),
         ("(" * 300, ["cannot read"]),
         ("-" * 3000 + "1", ["nested too deep", "split"]),

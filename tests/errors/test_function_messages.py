@@ -47,7 +47,7 @@ def text_first(mode="soft", t=0.0):
         (any_names, ["'any_names'", "(**more)"]),
         (by_keyword, ["'by_keyword'", "'gain' by keyword only", "remove the *"]),
         (seven, ["'seven' takes 7 arguments", "6 at most"]),
-        (min, ["'min' does not tell the names", "def law(t)"]),
+        (min, ["'min' does not expose the names", "def law(t)"]),
         (dict, ["'dict' is a class", "give a function"]),
         (functools.partial(seven, 1.0), ["unknown name 'b'", "<seven(b, c, d, e, f, g)>"]),
         (

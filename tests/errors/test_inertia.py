@@ -162,8 +162,8 @@ def test_meshes_that_cannot_be(fields: dict, part: str, tmp_path, monkeypatch: p
 BACKWARDS = [f[::-1] for f in FACES]
 SURFACES = [
     (FACES[:3], "it is not closed: 3 of its edges have a triangle on one side only. Close its holes and merge"),
-    ([FACES[0][::-1], *FACES[1:]], "its triangles do not all face outwards: at 3 edges two neighbours go round"),
-    (BACKWARDS, "triangles of it face inwards (the volume of a part comes out as -0.167). Turn these faces round"),
+    ([FACES[0][::-1], *FACES[1:]], "its triangles do not all face outwards: at 3 edges two neighbours are oriented"),
+    (BACKWARDS, "triangles of it face inwards (the volume of a part is -0.167). Flip the normals of these faces"),
     ([FACES[0], FACES[0][::-1]], "it encloses no volume. Give it a thickness"),
 ]
 
@@ -183,9 +183,7 @@ def test_a_part_that_is_turned_inside_out() -> None:
     """A cavity lies inside; a part beside the others that faces inwards is a mistake."""
     v = np.array(TETRAHEDRON)
     both = {"vertices": np.vstack([10 * v, v + 20]), "faces": np.vstack([FACES, np.array(BACKWARDS) + 4])}
-    assert "triangles of it face inwards (the volume of a part comes out as -0.167)" in said(
-        shape=fb.Mesh(**both), density=1
-    )
+    assert "triangles of it face inwards (the volume of a part is -0.167)" in said(shape=fb.Mesh(**both), density=1)
 
 
 SPHERE, PLATE = fb.Sphere(radius=1), fb.Box(edges=(1, 2, 3))
@@ -214,8 +212,8 @@ WEIGHTS = [
     ({**ONE, "shape": fb.Sphere(radius=1, density=1)}, "density of Sphere has no effect, since mass and inertia of"),
     ({**ONE, "shape": fb.Sphere(radius=1, mass=1)}, "mass of Sphere has no effect"),
     ({**ONE, "shape": fb.Sphere(radius=1, hole=True)}, "hole of Sphere has no effect"),
-    ({"mass": 1, "shape": SPHERE, "inertia_about": (0, 0, 0)}, "inertia_about says how inertia= is counted, which is"),
-    ({"mass": 1, "shape": SPHERE, "inertia_axes": (0, 0, 1)}, "inertia_axes says how inertia= is counted, which is"),
+    ({"mass": 1, "shape": SPHERE, "inertia_about": (0, 0, 0)}, "inertia_about is the reference of inertia=, which is"),
+    ({"mass": 1, "shape": SPHERE, "inertia_axes": (0, 0, 1)}, "inertia_axes is the reference of inertia=, which is"),
     (
         {"mass": 1, "shape": SPHERE, "com": (0, 0, 1)},
         "com is (0, 0, 1) m, but the centre of mass of its shapes is (0, 0, 0) m. Leave com out, or give mass and",
@@ -318,7 +316,9 @@ def test_a_fixed_body_is_said_in_other_words() -> None:
 def test_an_initial_condition_says_something() -> None:
     m = fb.Mechanism("m")
     m.add(fb.Body("b", **ONE))
-    with pytest.raises(fb.ModelError, match=r"Initial 'b\.x': it says nothing; give value=\.\.\., rate=\.\.\. or both"):
+    with pytest.raises(
+        fb.ModelError, match=r"Initial 'b\.x': it has no effect; give value=\.\.\., rate=\.\.\. or both"
+    ):
         m.add(fb.Initial("b.x"))
     m.add(fb.Initial("b.x", rate=0.0))
 

@@ -57,7 +57,7 @@ def test_misused_tables():
 
 
 PYTHON = {
-    "unknown argument": (lambda t, lenght: t, r"unknown name 'lenght'(.|\n)*arguments say what it is given"),
+    "unknown argument": (lambda t, lenght: t, r"unknown name 'lenght'(.|\n)*arguments select its inputs"),
     "any arguments": (lambda *a: a, r"takes any number of arguments \(\*a\); name those"),
     "a class": (float, "'float' is a class; give a function"),
     "too many": (lambda t, value, rate, r, a=1, b=2, c=3, *, d: t, "'d' by keyword only; remove the"),
@@ -73,7 +73,7 @@ def test_python_functions_that_are_no_laws(what):
 
 def test_a_driver_takes_no_python_function():
     with pytest.raises(
-        fb.ModelError, match=r"law of Driver 'k' is the Python function 'lambda', whose derivatives.*Table"
+        fb.ModelError, match=r"law of Driver 'k' is the Python function 'lambda', which gives no derivatives.*Table"
     ):
         plane().add(fb.Driver("k", "A.angle", lambda t: t))
 
@@ -109,5 +109,5 @@ def test_sensors_name_curves_that_results_have():
 def test_a_type_in_the_wrong_table_is_told_the_right_one(tmp_path, table, kind, right):
     path = tmp_path / "wrong.toml"
     path.write_text(f'name = "wrong"\n[[{table}]]\ntype = "{kind}"\nname = "x"\n', encoding="utf-8")
-    with pytest.raises(fb.ModelError, match=rf"'x' .*a {kind} stands in a table \[\[{right}\]\]"):
+    with pytest.raises(fb.ModelError, match=rf"'x' .*a {kind} belongs in a table \[\[{right}\]\]"):
         fb.load(path)

@@ -38,7 +38,7 @@ PLANAR = [
         "both its ends are on 'crank'; it must join two different bodies",
     ),
     (fb.Revolute, ("A", "ground", "ground"), {"at": (0, 0)}, "both its ends are on 'ground'"),
-    (fb.Revolute, ("A", "ground", "crank"), {}, "say where it is: at=... in world coordinates, or name frames"),
+    (fb.Revolute, ("A", "ground", "crank"), {}, "give its position: at=... in world coordinates, or name frames"),
     (
         fb.Revolute,
         ("A", "ground", "crank"),

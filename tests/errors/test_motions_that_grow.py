@@ -34,7 +34,7 @@ def test_a_fixed_step_that_is_too_long_is_told_with_the_longest_stable_one(metho
     assert f"a step of 0.1 s is too long for {method}" in text
     assert "3e+03 1/s" in text
     assert "divides by zero" not in text
-    longest = float(re.search(r"steps of up to (\S+) s", text)[1])
+    longest = float(re.search(r"steps up to (\S+) s", text)[1])
     assert abs(damped().simulate(0.5, step=0.95 * longest, method=method)["A.rate"][-1]) < 0.02
     wide = damped().simulate(0.06, step=1.2 * longest, method=method)
     assert abs(wide["A.rate"][-1]) > 1.0
@@ -89,7 +89,7 @@ def test_a_period_that_is_too_short_is_told_before_and_after():
     m = often(1e-6)
     m.add(fb.Event("never", "A.displacement > 1e9", do=[fb.Stop()]))  # it might end the motion before
     text = said(lambda: m.simulate(10, max_steps=3000))
-    assert "max_steps = 3000 steps were taken by t = 0.003 s. PID 'pid' has a period of 1e-06 s" in text
+    assert "max_steps = 3000 steps were taken up to t = 0.003 s. PID 'pid' has a period of 1e-06 s" in text
     assert "from t = 0.003 s to the end at 10 s it is sampled 1e+07 times" in text
     assert "stiffness" not in text
 

@@ -69,7 +69,10 @@ PLANAR = {
     "Coupler value": ({"coordinates": ["A.angle", "W.angle"], "value": "3 kg"}, "value of.*'3 kg': expected"),
     # joints
     "WheelOnLine flat": ({**AT2, "axis": (1, 0), "centre": (3, 0)}, "centre lies on the line; the wheel has no rad"),
-    "WheelOnLine off": ({**AT2, "axis": (1, 0), "centre": (2.5, 1)}, "square to the line; the centre is 0.5 m fur"),
+    "WheelOnLine off": (
+        {**AT2, "axis": (1, 0), "centre": (2.5, 1)},
+        "perpendicular to the line; the centre is 0.5 m fur",
+    ),
     "WheelOnLine bare": ({**AT2, "axis": (1, 0)}, "field 'centre' is missing"),
     "WheelOnLine axis": ({**AT2, "centre": (2, 1)}, r"give its axis in world coordinates.*axis=\(1, 0\)"),
     "KnifeEdge axis": (AT2, r"give its axis in world coordinates, for instance axis=\(1, 0\)"),
@@ -80,7 +83,7 @@ PLANAR = {
     "Cam radius": ({**AT2, "points": SQUARE, "radius": -1}, "radius is -1 m; it must be zero or greater"),
     "Cam nan": ({**AT2, "points": [*SQUARE, (NAN, 0)]}, "points of Cam 'x': the value is nan"),
     "Cam text": ({**AT2, "points": "circle"}, "'points' must be a list, got 'circle'"),
-    "Cam nowhere": ({"body_i": "arm", "body_j": "cart", "points": SQUARE}, "say where it is: at="),
+    "Cam nowhere": ({"body_i": "arm", "body_j": "cart", "points": SQUARE}, "give its position: at="),
     "Screw in the plane": ({**AT2, "lead": 1}, "no meaning in a planar mechanism; use a joint of the plane"),
     "RollingDisk in the plane": ({**AT2, "radius": 1}, "no meaning in a planar mechanism"),
     "GeneralUniversal in the plane": (
@@ -171,11 +174,11 @@ PLANAR = {
     "Brake of a formula": ({"capacity": "3 - 5"}, r"capacity of Brake 'x' is -2 N\*m; it must be zero or greater"),
     "Brake unit": ({"capacity": "2 N"}, "capacity of.*'2 N': expected a torque"),
     "Brake bare": ({"capacity": None}, "field 'capacity' is missing"),
-    "Brake weak": ({"static": 0.9}, "static is 0.9; it must be 1 or greater: what it holds at rest"),
+    "Brake weak": ({"static": 0.9}, "static is 0.9; it must be 1 or greater: the ratio of the largest torque"),
     "Brake misspelt": ({"coordinate": "A.angel"}, "no coordinate 'angel'.*mean 'angle'"),
     "Brake unknown name": ({"capacity": "2*pressure"}, "unknown name 'pressure'"),
     "Clutch negative": ({"capacity": -2}, r"capacity of Clutch 'x' is -2 N\*m; it must be zero or greater"),
-    "Clutch weak": ({"static": 0}, "static is 0; it must be 1 or greater: what it holds at rest"),
+    "Clutch weak": ({"static": 0}, "static is 0; it must be 1 or greater: the ratio of the largest torque"),
     "Clutch of one": ({"coordinate_j": "A.angle"}, "both its coordinates are 'A.angle'; name two"),
     "Clutch of two kinds": (
         {"coordinate_j": "S.displacement"},
@@ -242,7 +245,10 @@ SPATIAL = {
     "GeneralUniversal parallel": ({**AT3, "at": ((0, 0, 0), (0, 0, 1)), "axes": (Z, Z)}, "axes are parallel; a link"),
     "GeneralUniversal axes": ({**AT3, "at": ((0, 0, 0), (0, 0, 1))}, "give its two axes, for instance axes="),
     "GeneralUniversal one point": ({**AT3, "axes": (Z, (1, 0, 0))}, r"'at' must be a list of 2, got .0, 0, 1"),
-    "KnifeEdge along": ({**AT3, "axis": Z, "normal": (0, 0, 2)}, "its normal is along its edge; give the direction"),
+    "KnifeEdge along": (
+        {**AT3, "axis": Z, "normal": (0, 0, 2)},
+        "its normal is parallel to its edge; give the direction",
+    ),
     "KnifeEdge bare": (AT3, "give its axis in world coordinates"),
     "RollingDisk flat": ({**AT3, "axis": Z, "radius": 1}, "the wheel lies flat and cannot roll; turn its axis"),
     "RollingDisk radius": (
@@ -253,7 +259,7 @@ SPATIAL = {
     "RollingDisk bare": ({**AT3, "axis": (1, 0, 0)}, "field 'radius' is missing"),
     "RollingBall radius": ({**AT3, "radius": "0 mm"}, "radius is 0 m; it must be greater than 0"),
     "RollingBall unit": ({**AT3, "radius": "1 s"}, "radius of.*'1 s': expected a length"),
-    "RollingBall nowhere": ({"body_i": "ground", "body_j": "a", "radius": 1}, "say where it is: at="),
+    "RollingBall nowhere": ({"body_i": "ground", "body_j": "a", "radius": 1}, "give its position: at="),
     "WheelOnLine in space": (
         {**AT3, "axis": (1, 0, 0), "centre": Z},
         "for planar mechanisms; in space use RollingDisk",
@@ -265,7 +271,7 @@ SPATIAL = {
     "Bushing of four": ({**AT3, "stiffness": (1, 2, 3, 4)}, "one number or one for each axis"),
     "Bushing unit": ({**AT3, "stiffness": "3 N"}, "stiffness of.*'3 N': expected a stiffness"),
     "Bushing angle": ({**AT3, "angle": 1}, "in a spatial mechanism give orientation=, not angle="),
-    "Bushing nowhere": ({"body_i": "ground", "body_j": "a"}, "say where it is: at="),
+    "Bushing nowhere": ({"body_i": "ground", "body_j": "a"}, "give its position: at="),
     "JointFriction of a ball": ({"joint": "ball", "radius": 0.1}, "Spherical 'ball' has no coordinate 'angle'"),
     "PointForce of two": ({"body": "a", "force": (1, 2)}, "needs 3 components, such as"),
     "PointTorque of one": ({"body": "a", "torque": 1}, "needs 3 components, such as"),

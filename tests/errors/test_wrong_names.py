@@ -41,7 +41,7 @@ CASES = {
     "what is shown": (lambda: run().html(show=["name"]), r"did you mean 'names'"),
     "axes": (
         lambda: run()["A"].reaction(axes="jont"),
-        r"'A' knows no axes 'jont' \(did you mean 'joint'\?\); known: world",
+        r"'A' has no axes 'jont' \(did you mean 'joint'\?\); known: world",
     ),
     "side": (
         lambda: run()["A"].reaction(on="cran"),

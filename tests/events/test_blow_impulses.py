@@ -86,7 +86,7 @@ def test_joints_of_a_struck_four_bar(on, when):
     np.testing.assert_allclose(found[:, :2], by_hand(given), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found[:, 2:], 0.0, atol=1e-12)
     if on != "coupler":
-        told = [f"struck {on}: {blow:g} N m s" for blow in BLOWS[on]]
+        told = [f"impulse on {on}: {blow:g} N m s" for blow in BLOWS[on]]
         assert list(happened.done) == told
     assert run.health.acceleration_violation < 1e-9
 

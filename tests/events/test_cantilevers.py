@@ -73,4 +73,4 @@ def test_what_is_not_found_is_not_said_not_to_be():
     try:
         cantilever(12, 0.5, 0.3).simulate(1e-6, outputs=2)
     except fb.SimulationError as e:
-        assert "or there are such loads and the search ended short of them" in str(e)
+        assert "or the iteration did not converge to them" in str(e)

@@ -58,7 +58,7 @@ def test_a_box_dropped_on_a_corner_comes_to_lie():
 def test_a_ball_that_rolls_along_a_wall():
     """On floor and wall it sticks though the least forces would not hold it; friction at the wall once drove it.
 
-    Beside steps by impulses a tenth of a millisecond long.
+    Beside impulse time stepping a tenth of a millisecond long.
     """
     m, at = mechanism("labyrinth.py"), [0.0, 1.3, 1.4, 1.6]
     ways = []

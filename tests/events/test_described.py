@@ -78,8 +78,8 @@ WRONG = {
     "3": r"when is '3', which never changes",
     "turnd - 1": r"unknown name 'turnd'",
     "0 < t < 1": r"'0 < t < 1' has 2 comparisons; write one: both of two are true where min",
-    "t == 1": r"'t == 1' asks for equality; write the difference",
-    "t - 1 s": r"a quantity in a formula stands in parentheses",
+    "t == 1": r"'t == 1' is an equality; write the difference",
+    "t - 1 s": r"a quantity in a formula must be in parentheses",
     "": r"the expression is empty",
     "start": r"nothing is done at the start; give do",
 }
@@ -103,14 +103,14 @@ UNFIT = [
         [fb.Lock("A"), fb.Release("A.angle")],
         r"Lock of 'A' and Release of 'A.angle' are both in do, and they contradict",
     ),
-    ([fb.Set("k", 1), fb.Set("k", 2)], r"Set of 'k' and Set of 'k' are both in do, and each is said once"),
+    ([fb.Set("k", 1), fb.Set("k", 2)], r"Set of 'k' and Set of 'k' are both in do, and each may be given once"),
     ([fb.Stop(), fb.Stop()], r"Stop and Stop are both in do"),
     (fb.Impulse("rod"), r"Impulse of 'rod': it is none; give impulse"),
     (fb.Impulse("rod", (1, 0, 0)), r"impulse needs 2 components, such as \(0, 1\), got"),
     (fb.Impulse("rod", torque=(0, 0, 1)), r"torque needs 1 component, such as 0.5, got"),
     (fb.Impulse("rod", torque=1, at=(0, 0)), r"at has no effect on the impulse of a torque alone"),
     (fb.Impulse("rod", (1, 0), at=(0, "2 s")), r"at of Impulse of 'rod' in Event 'e'"),
-    (fb.Impulse("ground", (1, 0)), r"a blow on ground moves nothing"),
+    (fb.Impulse("ground", (1, 0)), r"an impulse on ground has no effect"),
     (fb.Impulse("A", (1, 0)), r"impulse needs 1 component"),
     (fb.Impulse("A", 1, axes="body"), r"axes is of a body; along a coordinate give one number"),
     (fb.Impulse("A", "1 N"), r"impulse of Impulse of 'A' in Event 'e': '1 N': expected a quantity \[N\*m\*s\]"),
@@ -144,7 +144,7 @@ FIELDS = [
     (lambda: fb.Event("e"), r"field 'when' is missing"),
     (lambda: fb.Set("k"), r"Set 'k': field 'value' is missing"),
     (lambda: fb.Note(""), r"give a name"),
-    (lambda: fb.Impulse(step=1e-3), r"choices of steps by impulses are fb.Stepping"),
+    (lambda: fb.Impulse(step=1e-3), r"options of impulse time stepping are fb.Stepping"),
 ]
 
 

@@ -142,7 +142,7 @@ def test_friction_of_a_driven_joint_slides_the_way_it_is_driven():
     m.add(fb.Brake("brake", "A.angle", capacity=3.0), fb.Driver("drive", "A.angle", "t**2 - 2*t"))
     r = m.inverse_dynamics(np.linspace(0.0, 2.0, 5))
     assert np.allclose(r.result["drive.effort"], [5.0, 5.0, 8.0, 11.0, 11.0])
-    assert any("taken as nothing where it does not slide" in x for x in r.result.health.remarks)
+    assert any("taken as zero where it does not slide" in x for x in r.result.health.remarks)
 
 
 def test_drivers_do_not_lead_past_a_stop():

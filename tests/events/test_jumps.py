@@ -141,7 +141,7 @@ def test_driver_that_moves_what_is_to_be_locked_is_told():
     m.add(fb.Body("a", mass=1.0, inertia=1.0), fb.Revolute("A", "ground", "a", at=(0, 0)))
     m.add(fb.Driver("turn", "A.angle", "2 * t"))
     here = standing(rows(m, Row("stop", of=("A.angle",), kind=STOP, par=(-1.0, 0.0))), "absolute")
-    with pytest.raises(fb.SimulationError, match="no impulses let the velocities fulfil") as error:
+    with pytest.raises(fb.SimulationError, match="no impulses satisfy all constraints on the velocities") as error:
         resolve_start(here)
     assert "stop" in str(error.value)
 
@@ -168,7 +168,7 @@ def test_start_beyond_a_limit_names_it():
     m = rods(ground=True)
     here = standing(rows(m, Row("knee", of=("B.angle",), kind=STOP, par=(0.2, 1.0))), "joint")
     with pytest.raises(
-        fb.ModelError, match=r"'knee'.*begins beyond it: B.angle is 0 rad and must be within 0.2 rad .* and 1 rad"
+        fb.ModelError, match=r"'knee'.*starts beyond it: B.angle is 0 rad and must be within 0.2 rad .* and 1 rad"
     ):
         resolve_start(here)
 

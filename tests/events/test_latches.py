@@ -48,7 +48,7 @@ def test_a_freewheel_takes_hold(coordinates):
 def test_a_freewheel_that_begins_the_wrong_way_is_refused(direction, way):
     m = wheels(0.3, 0.5, rates=(4.0 * direction, 1.0 * direction))
     m.add(fb.OneWay("freewheel", "B.angle", relative_to="A.angle", direction=direction))
-    said = rf"OneWay 'freewheel': the motion begins beyond it: the rate of {way} is -3 rad/s"
+    said = rf"OneWay 'freewheel': the motion starts beyond it: the rate of {way} is -3 rad/s"
     with pytest.raises(fb.ModelError, match=said):
         m.simulate(0.5)
 

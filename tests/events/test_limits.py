@@ -159,7 +159,9 @@ def test_steps_by_impulses_know_stops_and_refuse_the_rest():
         fb.Backlash("part", ("guide.displacement",), gap=0.1),
         fb.Rope("part", ("ground", "block"), at=((0, 3), (0, 0.5))),
     ):
-        with pytest.raises(fb.ModelError, match=rf"steps by impulses do not know {type(part).__name__} 'part'"):
+        with pytest.raises(
+            fb.ModelError, match=rf"impulse time stepping does not support {type(part).__name__} 'part'"
+        ):
             slider(part, height=0.5).simulate(1.0, method="impulse")
 
 

@@ -11,7 +11,7 @@ import flyball as fb
 from flyball.simulation import method_choice
 
 G = 9.81
-ADAPTIVE, STEPS = "dop853, from touch to touch", "steps by impulses"
+ADAPTIVE, STEPS = "dop853, event-driven", "impulse time stepping"
 
 
 def floor(planar=False):
@@ -49,7 +49,7 @@ def test_without_contact_nothing_is_said():
     ("parts", "why"),
     [
         ([box(f"b{k}", (k, 0, 0.1)) for k in range(7)], r"at more than|the box of 'b0' on the box of 'b1'"),
-        ([ball(f"b{k}", (k, 0, 0.1)) for k in range(10)], "at 55 places, too many"),
+        ([ball(f"b{k}", (k, 0, 0.1)) for k in range(10)], "at 55 points, too many"),
         ([fb.Bodies("balls", shape=fb.Sphere(radius=0.1), density=1000, position=[(0, 0, 1)])], "is many bodies"),
     ],
 )
@@ -66,9 +66,9 @@ def test_what_only_an_integration_knows_decides(monkeypatch):
     m.add(fb.Event("late", "t > 0.005", do=[fb.Stop()]))
     run = m.simulate(0.01, outputs=2)
     assert run.t[-1] == pytest.approx(0.005)
-    assert run.health.method == f"{ADAPTIVE}: Event 'late' is not known to {STEPS}"
+    assert run.health.method == f"{ADAPTIVE}: {STEPS} does not support Event 'late'"
     m = scene(*many)
-    assert m.simulate(0.01, outputs=2, rtol=1e-9).health.method.endswith("rtol= is not known to steps by impulses")
+    assert m.simulate(0.01, outputs=2, rtol=1e-9).health.method.endswith("impulse time stepping does not support rtol=")
     assert m.simulate(0.01, outputs=2, coordinates="joint").health.method.startswith(ADAPTIVE)
     assert m.simulate(0.01, outputs=2, max_step=0.01).health.method.startswith(STEPS)
 
@@ -79,7 +79,7 @@ def test_what_no_method_knows_is_refused_by_name(more):
     with pytest.raises(fb.ModelError, match=rf"the ellipsoid of 'egg'(?s:.*){next(iter(more))}(?s:.*)Leave one"):
         m.simulate(0.1, **more)
     name = next(iter(more))
-    with pytest.raises(fb.ModelError, match=f"{name}.*does nothing with steps|leave coordinates out"):
+    with pytest.raises(fb.ModelError, match=f"{name}.*does nothing with impulse|leave coordinates out"):
         m.simulate(0.1, method="impulse", **more)
 
 
@@ -87,7 +87,7 @@ def test_events_by_impulses_are_refused():
     m = scene(ball())
     m.add(fb.Event("late", "t > 0.005"))
     with pytest.raises(
-        fb.ModelError, match=r"steps by impulses do not know Event 'late'; the adaptive(?s:.*)leave method out"
+        fb.ModelError, match=r"impulse time stepping does not support Event 'late'; the adaptive(?s:.*)leave method out"
     ):
         m.simulate(0.1, method="impulse")
 
@@ -147,6 +147,6 @@ def test_a_motion_by_impulses_goes_on_by_impulses():
     m = scene(ball())
     first = m.simulate(0.1, outputs=2, method="impulse")
     assert m.simulate(0.2, outputs=2, start=first).health.method == (
-        f"{STEPS}: so went the motion that this one goes on from"
+        f"{STEPS}: as in the motion that this one continues"
     )
     assert m.simulate(0.2, outputs=2, start=m.simulate(0.1, outputs=2)).health.method == ADAPTIVE

@@ -139,7 +139,7 @@ def test_a_start_against_a_freewheel_is_told_at_any_pace(time):
     m = begun(u, 0.1, position=(0.5, 0))
     m.parameters["rate"] = 0.0
     m.add(fb.Revolute("A", "ground", "b", at=(0, 0)), fb.OneWay("wheel", "A.angle"), fb.Initial("A.angle", rate="rate"))
-    with pytest.raises(fb.ModelError, match=r"OneWay 'wheel': the motion begins beyond it"):
+    with pytest.raises(fb.ModelError, match=r"OneWay 'wheel': the motion starts beyond it"):
         m.simulate(u.T, parameters={"rate": -1e-6 / u.T})
     assert m.simulate(1e-3 * u.T, parameters={"rate": -1e-12 / u.T}).health.success
 

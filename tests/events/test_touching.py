@@ -236,7 +236,7 @@ def test_a_block_slides_off_a_table():
 
 
 def test_the_same_by_short_impulses():
-    """A box thrown onto the floor, tumbling, with friction: steps by impulses come nearer as they get shorter."""
+    """A box thrown onto the floor, tumbling, with friction: impulse time stepping come nearer as they get shorter."""
     ball = fb.Body("ball", shape=fb.Sphere(radius=0.1), density=1000, position=(0, 0, 0.4), velocity=(1, 0.3, 0),
                    angular_velocity=(3, 20, 5))  # fmt: skip
     m = scene(floor(), ball, friction=0.2, restitution=0.5)

@@ -21,7 +21,7 @@ def arm(*parts) -> fb.Mechanism:
 @pytest.mark.parametrize(
     ("when", "error", "said"),
     [
-        ("A.angle + 90 deg", ExpressionError, r"stands in parentheses, here \(90 deg\)"),
+        ("A.angle + 90 deg", ExpressionError, r"must be in parentheses, here \(90 deg\)"),
         ("sin(t)*2.5e-3 kN + t", ExpressionError, r"here \(2\.5e-3 kN\)"),
         ("A.angle > 1 m", UnitError, r"Event 'e': in 'A\.angle > 1 m' A\.angle is '1 rad'; '1 m': expected"),
         ("90 deg < a.x", UnitError, r"in '90 deg < a\.x' a\.x is '1 m'; '90 deg': expected"),
@@ -57,7 +57,7 @@ def test_actions(made, said):
 
 def test_a_start_beyond_a_limit_tells_degrees():
     with pytest.raises(
-        ModelError, match=r"begins beyond it: A\.angle is 0 rad and must be at least 0\.174533 rad \(10 deg\)"
+        ModelError, match=r"starts beyond it: A\.angle is 0 rad and must be at least 0\.174533 rad \(10 deg\)"
     ):
         arm(fb.Limit("L", "A.angle", lower="10 deg")).simulate(1)
 

@@ -62,7 +62,7 @@ def test_lists_that_no_longer_fit_are_told():
         m.simulate(0.01)
     m = pendulum()
     m.joints.append(m.bodies[0])
-    with pytest.raises(fb.ModelError, match="joints of 'pendulum' hold something else"):
+    with pytest.raises(fb.ModelError, match="joints of 'pendulum' contain something else"):
         m.simulate(0.01)
 
 

@@ -124,7 +124,7 @@ def test_a_driver_whose_law_jumps_is_named(method, step):
     """A shorter step would not do."""
     m = swing(fb.Driver("D", "A.angle", "where(t < 0.5, 0, t - 0.5)"))
     with pytest.raises(fb.SimulationError, match=r"Driver 'D' cannot be followed beyond t = 0\.5 s: its law jumps in its "
-                                                 r"rate, from 0 to 1, which asks for an infinite force") as e:  # fmt: skip
+                                                 r"rate, from 0 to 1, which requires an infinite force") as e:  # fmt: skip
         m.simulate(1.0, outputs=3, method=method, step=step)
     assert "step;" not in str(e.value)
     assert e.value.result.t[-1] <= 0.5

@@ -60,7 +60,7 @@ def refused(**options):
 
 
 def test_what_does_nothing_is_refused():
-    assert "max_step does nothing with steps of fixed width" in refused(step=0.1, max_step=0.2)
+    assert "max_step has no effect with fixed steps" in refused(step=0.1, max_step=0.2)
     assert "step must be greater than 0" in refused(step=-1.0)
     assert "Stepping(step=...)" in refused(step=0.1, method="impulse")
     assert pendulum().simulate(1.0, step="100 ms").health.steps == 10

@@ -175,10 +175,12 @@ def test_health_says_by_what_it_was_computed():
         .health
     )
     assert h.method == (
-        "generalised-alpha, as asked, steps of 0.01 s, rho_inf = 0.8, index 3: velocities are not held to the constraints"
+        "generalised-alpha, as requested, steps of 0.01 s, rho_inf = 0.8, index 3: velocities are not projected "
+        "on the constraints"
     )
     assert (
-        pendulum().simulate(0.1, outputs=2, step=0.01, method="rk45").health.method == "rk45, as asked, steps of 0.01 s"
+        pendulum().simulate(0.1, outputs=2, step=0.01, method="rk45").health.method
+        == "rk45, as requested, steps of 0.01 s"
     )
     assert not pendulum().simulate(0.1, outputs=2, method="rk45").health.method
 
@@ -205,7 +207,7 @@ def refused(**options):
 
 def test_what_makes_no_sense_is_refused():
     assert "takes steps of fixed width: give one, for instance step='1 ms'" in refused(method=ALPHA)
-    assert "0 (swings too fast" in refused(method=ALPHA, step=0.1, rho_inf=1.5)
-    assert "rho_inf is a number of method='generalised-alpha'" in refused(method="radau", rho_inf=0.5)
+    assert "0 (oscillations too fast" in refused(method=ALPHA, step=0.1, rho_inf=1.5)
+    assert "rho_inf belongs to method='generalised-alpha'" in refused(method="radau", rho_inf=0.5)
     assert "did you mean 'generalised-alpha'" in refused(method="newmark")
     assert "stabilization='baumgarte' does nothing" in refused(method=ALPHA, step=0.1, stabilization="baumgarte")

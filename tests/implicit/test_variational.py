@@ -135,7 +135,7 @@ def test_a_step_ends_at_an_event_and_goes_on(method):
 
 def test_comparison_knows_it():
     c = example("chaplygin_sleigh.toml").compare(1.0, outputs=5, formulations=[V], step=0.002, repeats=1)
-    assert "rows that restrain velocities alone" in c[V].message
+    assert "constraints on velocities" in c[V].message
     c = pendulum().compare(1.0, outputs=5, formulations=["projection", V], step=0.002, repeats=1)
     assert c[V].success
     assert c[V].difference < 1e-5
@@ -150,7 +150,7 @@ def refused(m, **options):
 def test_what_it_does_not_know_is_refused_by_name():
     assert "takes steps of fixed width" in refused(pendulum())
     assert "takes absolute coordinates" in refused(pendulum(), step=0.01, coordinates="joint")
-    assert "rows that restrain velocities alone" in refused(example("chaplygin_sleigh.toml"), step=0.01)
+    assert "constraints on velocities" in refused(example("chaplygin_sleigh.toml"), step=0.01)
     assert "stabilization='none' does nothing" in refused(pendulum(), step=0.01, stabilization="none")
     thin = fb.Mechanism("thin")
     thin.add(

@@ -104,7 +104,7 @@ def test_what_only_one_side_says_holds_for_both() -> None:
 
 
 def test_nobody_says_the_friction() -> None:
-    with pytest.raises(fb.ModelError, match=r"Contact 'contact': nothing says the friction of 'a' on 'c'"):
+    with pytest.raises(fb.ModelError, match=r"Contact 'contact': the friction of 'a' on 'c' is not given"):
         tables(three(between=["a", "c"]))
 
 

@@ -50,7 +50,7 @@ def put(shape: fb.Mechanism, planar: bool, **fields: object) -> tuple[fb.Mechani
 @pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
 def test_forms_reach_as_far_as_the_surface(shape) -> None:
     if type(shape).__name__ in FORMLESS:
-        with pytest.raises(ModelError, match="has no form that contact knows"):
+        with pytest.raises(ModelError, match="is not supported by contact detection"):
             put(shape, False)
         return
     _, G = put(shape, False)
@@ -69,13 +69,13 @@ def test_forms_reach_as_far_as_the_surface(shape) -> None:
 @pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
 def test_outlines_reach_as_far_as_the_surface(shape) -> None:
     if type(shape).__name__ in FLAT:
-        with pytest.raises(ModelError, match="has no outline that contact knows"):
+        with pytest.raises(ModelError, match="has no outline for contact detection"):
             put(shape, True)
         return
     try:
         _, G = put(shape, True)
     except ModelError as error:
-        assert "it stands oblique" in str(error) and isinstance(shape, (fb.Rod, fb.Link))
+        assert "it is oblique" in str(error) and isinstance(shape, (fb.Rod, fb.Link))
         return
     n = fb.model.element.resolve(shape, {})
     p, R = shape.pose(n)

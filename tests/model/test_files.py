@@ -109,7 +109,7 @@ def test_defaults_are_left_out() -> None:
 def test_what_has_no_place_in_a_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(fb.ModelError, match="cannot write"):
         planar().save(tmp_path / "no" / "such" / "folder.toml")
-    with pytest.raises(fb.ModelError, match="a text holds"):
+    with pytest.raises(fb.ModelError, match="a text contains"):
         dumps(fb.Mechanism("\ud800"))
 
 

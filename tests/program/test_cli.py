@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import flyball as fb
-from flyball.cli import app
+from flyball.cli import COMMANDS, app
 from tests.results.made_up import mechanism, slider_crank
 
 
@@ -32,6 +32,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     mechanism().save("crank.toml")
     return tmp_path
+
+
+def test_commands_are_listed_in_the_declared_order() -> None:
+    listed = re.findall(r"^  (\S+) {2,}", Said("--help").out.partition("Commands:")[2], re.M)
+    assert tuple(listed) == COMMANDS
+    assert listed[:3] == ["run", "check", "view"]
 
 
 def test_run_writes_everything_and_says_so(here: Path) -> None:

@@ -105,7 +105,7 @@ def test_what_a_method_does_not_have_is_refused_by_name():
 def test_nothing_to_stabilise():
     m = fb.Mechanism("stone", planar=True)
     m.add(fb.Body("b", mass=1, inertia=1))
-    with pytest.raises(fb.ModelError, match=r"does nothing: no constraint is left to be kept; leave it out$"):
+    with pytest.raises(fb.ModelError, match=r"has no effect: there are no constraints to stabilise; leave it out$"):
         m.simulate(1.0, coordinates="absolute", stabilization="none")
 
 
@@ -118,8 +118,8 @@ def test_nothing_to_stabilise():
             lambda m: m.compare(1.0, formulations=["projection"], alpha=3.0),
             "alpha is a rate of the formulation 'baumgarte'",
         ),
-        (lambda m: m.modes(about=m.equilibrium(), frozen=True), "frozen is about a motion: at an equilibrium nothing"),
-        (lambda m: m.root_locus("k", [1, 2], equilibrium=True, frozen=True), "frozen does nothing where nothing moves"),
+        (lambda m: m.modes(about=m.equilibrium(), frozen=True), "frozen applies to a motion; it has no effect"),
+        (lambda m: m.root_locus("k", [1, 2], equilibrium=True, frozen=True), "frozen has no effect at an equilibrium"),
         (lambda m: m.simulate(1j), "t_end is a time"),
         (lambda m: m.simulate("1 m"), "t_end: '1 m': expected a time"),
         (lambda m: m.simulate(1, parameters=5), "parameters maps names to values"),
@@ -137,9 +137,9 @@ def test_nothing_to_stabilise():
         (lambda m: m.sensitivity(["b.x"], ["k"], t_end=1), "t_end is of a motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], rtol=1e-3), "rtol is of a motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], about="equilibrium"), "about is for modes"),
-        (lambda m: m.optimize(["b.x"], ["k"], minimize=sum, weights=2), "with minimize they do nothing"),
+        (lambda m: m.optimize(["b.x"], ["k"], minimize=sum, weights=2), "with minimize they have no effect"),
         (lambda m: m.optimize(["b.x"], ["k"], target=[0], evaluations=0), "evaluations must be at least 1"),
-        (lambda m: m.root_locus("k", [1, 2], about=m.simulate(0.1), equilibrium=True), "say either about or"),
+        (lambda m: m.root_locus("k", [1, 2], about=m.simulate(0.1), equilibrium=True), "give either about or"),
         (lambda m: m.linearize(inputs="k"), "inputs is a list of names"),
         (lambda m: m.equilibrium(preload="f"), "preload is a list of names"),
     ],

@@ -137,14 +137,12 @@ def test_health_says_what_went_wrong_with_contacts() -> None:
     assert r.health.contact is not None
     assert r.health.contact.warnings() == ()
     cut = ContactHealth("APGD", solves=400, unconverged=3, iterations=4000, worst_at=0.25, residual=0.1)
-    assert (
-        "3 of 400 contact solves were cut off before they had converged, the worst at t = 0.25 s" in cut.warnings()[0]
-    )
+    assert "3 of 400 contact solves were stopped before convergence, the worst at t = 0.25 s" in cut.warnings()[0]
     assert dict(cut.lines())["contact solves"] == "400, 10 iterations each, 3 not converged"
     (deep,) = ContactHealth(worst_overlap=0.01, size=0.1).warnings()
     assert "10 per cent of the smallest body" in deep
     (begun,) = ContactHealth(worst_overlap=0.01, overlap_at_start=0.01, size=0.1).warnings()
-    assert "as described" in begun
+    assert "in the reference configuration" in begun
     noted = ContactHealth(notes=("no unique force: Painleve",))
     r.health.contact = noted
     assert r.health.warnings == ("no unique force: Painleve",)

@@ -104,7 +104,7 @@ def test_a_structure_at_rest_has_no_energy_to_lose():
 
 
 def test_friction_of_an_undetermined_reaction_is_a_warning():
-    """A door on two hinges: either may carry the weight, so the friction of one is one choice of many."""
+    """A door on two hinges: either may carry the weight, so the friction of one is not unique."""
     m = fb.Mechanism("door", gravity=(0, 0, -G))
     m.add(fb.Body("leaf", mass=30.0, inertia=(10.0, 11.6, 1.6), position=(0.4, 0, 1), angular_velocity=(0, 0, 1)))
     for name, z in (("upper", 1.8), ("lower", 0.2)):

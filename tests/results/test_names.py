@@ -112,7 +112,7 @@ def test_both_ways():
         ("carts.x", r"no part named 'carts' \(did you mean 'cart'\?\)"),
         ("energy.work", "result.energy.work"),
         ("energy.knetic", r"did you mean 'kinetic'"),
-        ("u", "a result says nothing of Table 'u'"),
+        ("u", "a result has no data of Table 'u'"),
         (0, "a result is read by name, for instance"),
     ],
 )

@@ -32,8 +32,8 @@ def test_what_is_told_is_what_the_angle_is_off_by(method, step):
     assert np.abs(r.energy.balance).max() < 1e-6 * r.energy.kinetic[0]
     (text,) = r.health.doubtful
     assert r.health.status == "done, but doubtful"
-    assert text.startswith(f"'b' turns by up to {W * step:.2g} rad a step, which method={method!r}")
-    assert float(re.search(r"off by about (\S+) rad", text)[1]) == pytest.approx(off, rel=0.05)  # two digits
+    assert text.startswith(f"'b' turns by up to {W * step:.2g} rad per step. The error of method={method!r}")
+    assert float(re.search(r"wrong by about (\S+) rad", text)[1]) == pytest.approx(off, rel=0.05)  # two digits
 
 
 @pytest.mark.parametrize(

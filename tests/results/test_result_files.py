@@ -210,7 +210,7 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
         group.variables["numbers"][...] = np.concatenate([x.ravel() for x in held.values() if not isinstance(x, str)])
 
     rewritten(tmp_path / "r.nc", swap)
-    with pytest.raises(fb.ModelError, match=r"r\.nc is damaged: what it holds does not fit (its|the) checksum"):
+    with pytest.raises(fb.ModelError, match=r"r\.nc is damaged: its contents do not match (its|the) checksum"):
         fb.load_result(tmp_path / "r.nc")
     end = whole.rindex(b"\nflyball SHA-256")
     (tmp_path / "r.nc").write_bytes(whole[:end])  # a program that wrote it anew without harm
@@ -243,7 +243,7 @@ def test_files_of_one_variable_for_each_array_are_read(result: Result, tmp_path:
     same(result, back)
     assert back.health.warnings == result.health.warnings
     rewritten(tmp_path / "r.nc", lambda group: group.attrs.update({"checksum": "0"}))
-    with pytest.raises(fb.ModelError, match="does not fit its checksum"):
+    with pytest.raises(fb.ModelError, match="do not match its checksum"):
         fb.load_result(tmp_path / "r.nc")
 
 

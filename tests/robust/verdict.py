@@ -71,7 +71,7 @@ def _of_tolerance(case: Case, energy: float) -> bool:
         return False
     tight = {"rtol": TIGHTER * loose, "atol": TIGHTER * case.options.get("atol", loose)}
     r = case.mechanism.simulate(case.t_end, **{"outputs": OUTPUTS, "max_steps": STEPS} | case.options | tight)
-    return bool(r.health.energy_drift <= LESS * min(energy, UNBALANCED) * energy_moved(r))
+    return bool(r.energy.drift <= LESS * min(energy, UNBALANCED) * energy_moved(r))
 
 
 def _refused(error: Exception, case: Case) -> Verdict:
@@ -109,7 +109,7 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):
         return Verdict("broken", f"an impact gives energy: {np.diff(lost, prepend=0.0).min():.3g} J")
     moved = energy_moved(r)
-    energy = r.health.energy_drift / moved if moved > 0.0 else 0.0
+    energy = r.energy.drift / moved if moved > 0.0 else 0.0
     for f in case.mechanism.forces:
         if f.single == "friction" and np.diff(r[f.name].work).max(initial=0.0) > 1e-6 * (1e-6 + moved):
             return Verdict("broken", f"{f.title} gives {np.diff(r[f.name].work).max():.3g} J")
@@ -117,10 +117,10 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if out.violation > VIOLATION and case.options.get("stabilization") != "baumgarte":
         return Verdict("broken", f"violation {out.violation:.2e}", out.violation, energy, out.residual)
     if out.residual > RESIDUAL:
-        told = any("accelerations miss" in w for w in r.health.warnings)
+        told = any("accelerations violate" in w for w in r.health.warnings)
         kind = "warned" if told else "broken"
         return Verdict(kind, f"G vdot - gamma {out.residual:.2e}", out.violation, energy, out.residual)
-    if r.health.energy_drift > UNBALANCED * moved + 1e-9 * (1.0 + np.abs(r.energy.potential).max()):
+    if r.energy.drift > UNBALANCED * moved + 1e-9 * (1.0 + np.abs(r.energy.potential).max()):
         if _of_tolerance(case, energy):
             return out
         told = any("energy balance" in w for w in r.health.warnings)

@@ -83,23 +83,25 @@ def test_what_is_no_choice_is_refused(wish):
 @pytest.mark.parametrize("wish", [True, False])
 def test_steps_by_impulses_have_no_choice(wish):
     m = example("conveyor.toml")
-    with pytest.raises(fb.ModelError, match=rf"^specialize={wish} does nothing with steps by impulses; leave it out"):
+    with pytest.raises(
+        fb.ModelError, match=rf"^specialize={wish} does nothing with impulse time stepping; leave it out"
+    ):
         m.simulate(0.1, specialize=wish, method="impulse")
-    with pytest.raises(fb.ModelError, match="specialize= is not known to steps by impulses"):
+    with pytest.raises(fb.ModelError, match="impulse time stepping does not support specialize="):
         m.simulate(0.1, specialize=wish)
 
 
 def test_partitioning_has_no_made_code(maker):
     m = four_bar()
-    with pytest.raises(fb.ModelError, match=r"^specialize=True: partitioning chooses .*; leave it out$"):
+    with pytest.raises(fb.ModelError, match=r"^specialize=True: coordinate partitioning changes .*; leave it out$"):
         m.simulate(0.1, coordinates="absolute", stabilization="partitioning", specialize=True)
     r = m.simulate(0.1, coordinates="absolute", stabilization="partitioning")
-    assert r.health.engine.startswith("table-driven: partitioning")
+    assert r.health.engine.startswith("general engine: coordinate partitioning")
 
 
 def test_not_wanted_is_not_looked_for(monkeypatch):
     monkeypatch.setattr(solver_switching, "codegen", None)
-    assert four_bar().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
+    assert four_bar().simulate(0.1, specialize=False).health.engine == "general engine: as requested"
 
 
 def test_wanted_is_made_before_the_motion_begins(maker):
@@ -114,13 +116,13 @@ def test_what_cannot_be_made_is_refused_with_the_reason(maker):
     maker.refused = "it has 999 rows, and code is made for 120"
     with pytest.raises(fb.ModelError, match=r"^specialize=True: it has 999 rows, and .*; leave it out$"):
         four_bar().simulate(0.1, specialize=True)
-    assert four_bar().simulate(10.0).health.engine == f"table-driven: {maker.refused}"
+    assert four_bar().simulate(10.0).health.engine == f"general engine: {maker.refused}"
 
 
 def test_short_motions_are_left_alone(maker):
     r = four_bar().simulate(0.5)
     assert maker.made == 0
-    assert r.health.engine == "table-driven: too little is computed to make code for it"
+    assert r.health.engine == "general engine: the motion is too short for code made for it"
 
 
 def test_a_long_motion_goes_on_with_code_that_pays(maker):
@@ -181,7 +183,7 @@ def test_many_short_motions_pay_for_code_together(maker):
         runs += 1
     assert 5 <= runs < 200
     again = four_bar().simulate(0.5, specialize=False)
-    assert again.health.engine == "table-driven: asked for"
+    assert again.health.engine == "general engine: as requested"
 
 
 @pytest.mark.filterwarnings("ignore::flyball.PerformanceNotice")
@@ -241,7 +243,7 @@ class Stuck(Code):
 def test_where_made_code_gets_stuck_the_loops_go_on(maker, monkeypatch):
     monkeypatch.setattr(maker, "code", lambda plan, x: (Stuck(), "made now"))
     r, s = (four_bar().simulate(0.5, specialize=x) for x in (True, False))
-    assert r.health.engine.startswith("made for this mechanism: made now; table-driven from t = 0 s on")
+    assert r.health.engine.startswith("made for this mechanism: made now; general engine from t = 0 s")
     np.testing.assert_allclose(r.q, s.q, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(r.vdot, s.vdot, rtol=1e-9, atol=1e-9)
     kinematics = [driven().kinematics(21, t_end=1.0, specialize=x) for x in (True, False)]
@@ -278,7 +280,11 @@ def test_kinematics_has_the_choice_too(maker):
 def test_the_command_has_both_flags(maker, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     door().save("m.toml")
-    for flags, engine in (([], "table"), (["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for")):
+    for flags, engine in (
+        ([], "general"),
+        (["--specialize"], "made"),
+        (["--no-specialize"], "general engine: as requested"),
+    ):
         words = ["run", "m.toml", "--t-end", "0.1", "--no-plots", "--no-animation", "--quiet", *flags]
         said = CliRunner().invoke(app, words)
         assert said.exit_code == 0, said.output

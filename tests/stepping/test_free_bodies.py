@@ -1,4 +1,4 @@
-"""Free bodies in steps by impulses: what is exact whatever the step is."""
+"""Free bodies in impulse time stepping: what is exact whatever the step is."""
 
 import numpy as np
 import pytest

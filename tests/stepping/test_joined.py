@@ -1,4 +1,4 @@
-"""Mechanisms in steps by impulses, without contact: order, energy, stiff springs, spinning tops."""
+"""Mechanisms in impulse time stepping, without contact: order, energy, stiff springs, spinning tops."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Stops, ropes, joint friction and stiff springs that turn, in steps by impulses."""
+"""Stops, ropes, joint friction and stiff springs that turn, in impulse time stepping."""
 
 import numpy as np
 import pytest

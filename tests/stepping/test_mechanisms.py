@@ -113,7 +113,7 @@ def test_a_force_that_is_no_number_is_told():
     m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
     m.add(fb.Prismatic("rail", "ground", "bob", at=(1.0, 0, 1.1), axis=(0, 0, 1)))
     m.add(fb.Actuator("push", "rail.displacement", force="sqrt(0.2 - t)"))
-    with pytest.raises(fb.SimulationError, match="cannot go on") as told:
+    with pytest.raises(fb.SimulationError, match="cannot continue") as told:
         m.simulate(1.0, outputs=11, method="impulse")
     assert told.value.t == pytest.approx(0.2, abs=5e-3)
 

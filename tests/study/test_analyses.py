@@ -94,7 +94,7 @@ def test_functions_of_the_mechanism():
     s = hanging().study({"load": [1.0, 2.0, -1.0]}, {"lift": lambda e: e.preload["push"]}, analysis=preload)
     np.testing.assert_allclose(s["lift"][:2], [9.81, 19.62], rtol=1e-12)
     assert list(s.reasons) == [2]
-    with pytest.raises(fb.ModelError, match=r"of='pan.y': names say nothing of what a function"):
+    with pytest.raises(fb.ModelError, match=r"of='pan.y': the results of a function"):
         hanging().study({"load": [1.0]}, ["pan.y"], analysis=preload)
 
 

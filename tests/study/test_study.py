@@ -220,5 +220,5 @@ def test_indices_of_a_sum():
     np.testing.assert_allclose(found.first, [[0.2, 0.8, 0.0]], atol=0.05)
     np.testing.assert_allclose(found.total, [[0.2, 0.8, 0.0]], atol=0.05)
     assert found["end(block.x)"]["idle"][1] < 1e-12
-    with pytest.raises(fb.ModelError, match="only the runs of design='saltelli'"):
+    with pytest.raises(fb.ModelError, match="sensitivity indices need design='saltelli'"):
         pushed().study({"a": [1.0]}, ["end(block.x)"], t_end=1.0).indices()

@@ -148,7 +148,7 @@ def test_an_executor_that_fails_leaves_what_was_done(tmp_path):
             return out
 
     file = tmp_path / "s.nc"
-    with pytest.raises(fb.AnalysisError, match=r"OSError: the machine is gone\); what was done is in .*s.nc"):
+    with pytest.raises(fb.AnalysisError, match=r"OSError: the machine is gone\); the completed runs are in .*s.nc"):
         ask(file, executor=Fails())
     assert 0 < fb.load_study(file).done.sum() < 200
     assert ask(file)["b.vx"].tobytes() == ask()["b.vx"].tobytes()

@@ -96,7 +96,7 @@ def test_a_surface_is_the_mean_over_other_parameters():
     mean = s["end(b.x)"].mean(axis=2)
     assert low <= mean.min()
     assert high >= mean.max()
-    with pytest.raises(fb.ModelError, match=r"b.x is a curve; ask for end\(b.x\)"):
+    with pytest.raises(fb.ModelError, match=r"b.x is a curve; give end\(b.x\)"):
         s.surface("b.x", "mass", "k")
     with pytest.raises(fb.ModelError, match="not 'kk'"):
         s.surface("end(b.x)", "mass", "kk")

@@ -131,7 +131,7 @@ def test_values_are_refused_by_name():
         m.symbolic(inputs=["hinge"])
     with pytest.raises(ModelError, match="coordinates"):
         m.symbolic(coordinates="polar")
-    with pytest.raises(ModelError, match="knows no contact"):
+    with pytest.raises(ModelError, match="supports no contact"):
         mechanisms.example("dominoes.py").symbolic()
 
 
@@ -222,7 +222,7 @@ def test_angles_that_are_measured_against_their_coordinate(coordinates):
 def test_why_these_coordinates_is_told():
     m = mechanisms.four_bar()
     assert m.symbolic().coordinates.startswith("joint: these make the fewest equations")
-    assert m.symbolic(coordinates="joint").coordinates.startswith("joint: as asked for")
+    assert m.symbolic(coordinates="joint").coordinates.startswith("joint: as requested")
 
 
 def test_parameters_with_a_unit_are_symbols_and_derived_ones_are_expressions_of_them():

@@ -66,9 +66,7 @@ def test_a_spring_curve_repeats(coordinates):
 def test_a_table_of_time_that_ends_too_early_is_told_before_the_run(law, coordinates):
     m = cart(**{law: "0.5*curve(2*t)"})
     who = {"force": "Actuator 'A'", "driver": "Driver 'D'"}[law]
-    says = (
-        rf"{who}: at t = 0.5 s Table 'curve' is asked for what is just beyond x = 1, and its points go from 0 to 1; .*"
-    )
+    says = rf"{who}: at t = 0.5 s Table 'curve' is evaluated at a point just beyond x = 1, and its points extend from 0 to 1; .*"
     with pytest.raises(fb.ModelError, match=says + r"beyond='hold', 'line' or 'repeat'. .*from 0 s to 2 s"):
         m.simulate(2.0, coordinates=coordinates)
     assert m.simulate(0.5, coordinates=coordinates).t[-1] == 0.5
@@ -80,7 +78,9 @@ def test_a_table_of_time_that_ends_too_early_is_told_before_the_run(law, coordin
 
 
 def test_compare_tells_it_before_the_runs():
-    with pytest.raises(fb.ModelError, match=r"Actuator 'A': at t = 1 s Table 'curve' is asked for what is just beyond"):
+    with pytest.raises(
+        fb.ModelError, match=r"Actuator 'A': at t = 1 s Table 'curve' is evaluated at a point just beyond"
+    ):
         cart("curve(t)").compare(2)
 
 
@@ -97,7 +97,9 @@ def test_a_table_asked_where_a_choice_leaves_it_out_is_none_of_its_business(coor
 def test_a_motion_that_gets_there_stops_with_element_table_value_and_time(coordinates):
     """Under a force of 1 + x(x + 1) the cart comes to x = 1, where its curve ends."""
     m = cart("4 + 0*curve(value)")
-    says = r"just after t = 1 s, force of Actuator 'A': at t = 1 s Table 'curve' is asked for what is just beyond x = 1"
+    says = (
+        r"just after t = 1 s, force of Actuator 'A': at t = 1 s Table 'curve' is evaluated at a point just beyond x = 1"
+    )
     with pytest.raises(fb.SimulationError, match=says) as stopped:
         m.simulate(3.0, coordinates=coordinates, outputs=[0.5, 1.0, 2.0])
     assert stopped.value.t == pytest.approx(1.0, abs=1e-6)
@@ -108,18 +110,20 @@ def test_a_motion_that_gets_there_stops_with_element_table_value_and_time(coordi
 
 def test_a_start_beyond_the_ends_is_told_at_once():
     m = cart("curve(value - 0.5)")
-    says = r"force of Actuator 'A': at t = 0 s Table 'curve' is asked for x = -0.5, and its points go from 0 to 1"
+    says = (
+        r"force of Actuator 'A': at t = 0 s Table 'curve' is evaluated at x = -0.5, and its points extend from 0 to 1"
+    )
     for ask in (lambda: m.simulate(1.0), m.equilibrium, m.modes, m.linearize):
         with pytest.raises(fb.FlyballError, match=says):
             ask()
-    assert any("Table 'curve' is asked for x = -0.5" in w for w in m.check().warnings)
-    with pytest.raises(fb.AssemblyError, match=r"law of Driver 'D' has no finite value there: .*asked for x = 3,"):
+    assert any("Table 'curve' is evaluated at x = -0.5" in w for w in m.check().warnings)
+    with pytest.raises(fb.AssemblyError, match=r"law of Driver 'D' has no finite value there: .*evaluated at x = 3,"):
         cart(driver="curve(t + 3)").assemble()
 
 
 def test_units_of_the_table_are_spoken():
     m = cart("curve(value)", x=(10, 50, 90), y=(0, 1, 2), x_unit="mm")
-    with pytest.raises(fb.ModelError, match=r"asked for x = 0 mm, and its points go from 10 to 90 mm"):
+    with pytest.raises(fb.ModelError, match=r"evaluated at x = 0 mm, and its points extend from 10 to 90 mm"):
         m.simulate(1.0)
 
 
@@ -129,5 +133,5 @@ def test_what_a_file_says(tmp_path):
     assert 'beyond = "repeat"' in (tmp_path / "m.toml").read_text()
     assert fb.load(tmp_path / "m.toml") == m
     (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace('beyond = "repeat"', 'outside = "hold"'))
-    with pytest.raises(fb.ModelError, match=r"Table 'curve': unknown field 'outside'.*it is called beyond"):
+    with pytest.raises(fb.ModelError, match=r"Table 'curve': unknown field 'outside'.*this field is now beyond"):
         fb.load(tmp_path / "m.toml")

@@ -112,7 +112,7 @@ def test_a02_with_lengths_that_are_a_little_off(seed):
         r = m.simulate(10.0)
     except fb.SimulationError as stopped:
         r = stopped.result
-        assert "cannot go on" in str(stopped)
+        assert "cannot continue" in str(stopped)
         assert f"t = {stopped.t:.6g}" in str(stopped)
     assert np.isfinite(r.q).all()
     assert r.health.violation < 1e-9

@@ -201,7 +201,7 @@ def test_pages_go_where_they_can_be_written(result: Result, tmp_path: Path) -> N
 def test_a_result_without_times_cannot_be_drawn() -> None:
     nothing = still(mechanism(), 0)
     for draw in (nothing.html, nothing.report):
-        with pytest.raises(fb.ModelError, match="'slider/crank' has no output time: there is nothing to draw"):
+        with pytest.raises(fb.ModelError, match="'slider/crank' has no output time: there is nothing to plot"):
             draw()
 
 

@@ -80,7 +80,7 @@ def test_an_end_by_an_event_is_told_everywhere(tmp_path: Path, monkeypatch: pyte
     monkeypatch.chdir(tmp_path)
     m = ball()
     m.add(fb.Event("low", "0.8 - b.y", do=[fb.Stop()]))
-    said = "ended at 0.3 s by event 'low' (asked: 5 s)"
+    said = "ended at 0.3 s by event 'low' (requested: 5 s)"
     r = m.simulate(5)
     assert (r.health.status, r.health.message) == (said, said)
     assert r.health.success

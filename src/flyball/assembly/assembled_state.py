@@ -117,13 +117,16 @@ def velocity_error(c: CompiledMechanism, gaps: Mapping[str, float], best: Any, r
     """Return the error for contradictory velocity constraints; ``gaps``: residuals at the nearest velocities [m/s or
     rad/s].
     """
-    begin = f"{c.structure.model.name!r}: no velocities fulfil all constraints at t = {best.t:g} s"
+    begin = f"{c.structure.model.name!r}: no velocities satisfy all constraints at t = {best.t:g} s"
     if reason:
         return AssemblyError(f"{begin}: {reason}", gaps=dict(gaps), best=best)
     listed = ", ".join(f"{k} by {x:.4g} {rate_unit(c, k)}" for k, x in list(gaps.items())[:MAX_LISTED])
     more = f" and {len(gaps) - MAX_LISTED} more" if len(gaps) > MAX_LISTED else ""
     return AssemblyError(
-        f"{begin}; the nearest miss {listed}{more}. Check drivers, initial rates and bodies with as_drawn=True",
+        (
+            f"{begin}; the nearest velocities violate {listed}{more}. Check drivers, initial rates and bodies with "
+            "as_drawn=True"
+        ),
         gaps=dict(gaps),
         best=best,
     )

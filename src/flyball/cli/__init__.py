@@ -3,7 +3,7 @@
 ``cli/application.py`` contains the typer application, exit codes and printing of errors; ``cli/subcommand.py`` makes a
 subcommand from a method of `Mechanism`; ``cli/options.py`` turns its arguments into command-line options. The other
 modules contain the subcommands of one subject each. A new subcommand is a function with the decorator `command`; its
-module is imported here. Slow imports are placed inside functions.
+module is imported here, and its name stands in `COMMANDS`. Slow imports are placed inside functions.
 """
 
 from __future__ import annotations
@@ -20,6 +20,14 @@ from . import run as run
 from . import study as study
 from . import view as view
 from .application import app
+
+COMMANDS = (
+    *("run", "check", "view", "compare", "kinematics", "inverse-dynamics"),
+    *("mobility", "singularities", "equilibrium", "equilibria", "linearize", "modes", "root-locus"),
+    *("study", "optimize", "sensitivity", "equations", "export", "compile"),
+)
+"""Every subcommand, in the order of ``flyball --help``."""
+app.registered_commands.sort(key=lambda c: COMMANDS.index(c.name or c.callback.__name__))  # type: ignore[union-attr]
 
 
 def main(argv: Sequence[str] | None = None) -> None:

@@ -33,7 +33,7 @@ ModelFile = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 AboutEquilibrium = Annotated[
-    bool, typer.Option("--equilibrium", help="About the equilibrium next to the mechanism as drawn.")
+    bool, typer.Option("--equilibrium", help="About the equilibrium near the reference configuration.")
 ]
 SteadyTurning = Annotated[
     list[str] | None,

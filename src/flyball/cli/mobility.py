@@ -36,7 +36,7 @@ def singularities(
     *,
     branch: Annotated[
         str | None,
-        typer.Option(help="Then go on along a branch: POINT.BRANCH of the table, points from 1, branches from 0."),
+        typer.Option(help="Then follow a branch: POINT.BRANCH of the table, points from 1, branches from 0."),
     ] = None,
     plot: PlotFile = None,
     brief: Annotated[bool, typer.Option("--table", help="One line a position.")] = False,

@@ -187,9 +187,7 @@ def make_option(p: inspect.Parameter, described: ArgumentHelp, override: OptionO
     required = p.default is p.empty and override.default is None
     kind = str(p.annotation).removesuffix(" | None")
     if kind not in OPTION_TYPES and override.type is None:
-        raise TypeError(
-            f"argument {p.name!r} is a {p.annotation}: say how it stands on the command line, or leave it out"
-        )
+        raise TypeError(f"argument {p.name!r} is a {p.annotation}: declare its command-line option, or leave it out")
     reads, make = OPTION_TYPES.get(kind, (override.type, _unchanged))
     reads, make = override.type or reads, override.read or make
     flag = f"--{p.name.replace('_', '-')}"

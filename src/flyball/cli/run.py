@@ -113,7 +113,7 @@ def _write_run_files(result: Result, folder: Path, plots: bool, pages: Sequence[
     else:
         notes.append(f"result.csv is left out: some {curves} curves at {len(result.t)} times; read result.nc instead")
     if not len(result.t):
-        notes.append("no output time was reached: there is nothing to draw")
+        notes.append("no output time was reached: there is nothing to plot")
         return files, notes
     if plots:
         from ..view.result_plots import write_standard_plots
@@ -145,7 +145,7 @@ def kinematics(
     request: Request,
     *,
     point: Annotated[
-        list[str] | None, typer.Option(help='Body, frame, or "body:x,y" whose path is drawn; may be repeated.')
+        list[str] | None, typer.Option(help='Body, frame, or "body:x,y" whose path is plotted; may be repeated.')
     ] = None,
     out: OutputFolder = None,
 ) -> None:

@@ -307,7 +307,7 @@ class ContactFinder:
         elif status == FULL_PAIRS:
             self._more_pairs()
         else:
-            raise ValueError(f"status {status} is none that asks for room")
+            raise ValueError(f"status {status} is no status of a full table")
 
     def _more_pairs(self) -> None:
         B, ns = self.search, len(self.geometry.shape_i)
@@ -316,9 +316,9 @@ class ContactFinder:
         if capacity >= most:
             i, many = self.most_pairs()
             raise ModelError(
-                f"too many shapes are in one place: {capacity} pairs of {ns} shapes are near each other, "
-                f"{many} of them with shape {i} alone; move bodies that start at the same place apart, or use groups "
-                "for those that may go through each other"
+                f"too many shapes are close together: {capacity} pairs of {ns} shapes are near each other, {many} of "
+                f"them with shape {i} alone; move bodies that start at the same place apart, or use groups for those "
+                "that may go through each other"
             )
         larger = min(2 * capacity, most)
         pair, seen = np.zeros((larger, 3), np.int32), np.full((2, larger), -1, np.int32)

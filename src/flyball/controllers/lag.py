@@ -44,7 +44,7 @@ class Lag(Controller):
     def check(self, n: SimpleNamespace) -> None:
         """Refuse time constants of the wrong sign."""
         super().check(n)
-        positive(self, n, "time", why="What follows at once needs no Lag")
+        positive(self, n, "time", why="A signal without delay needs no Lag")
         nonnegative(self, n, "lead")
 
     def given(self) -> dict[str, Any]:

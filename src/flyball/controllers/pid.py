@@ -91,7 +91,7 @@ class PID(Controller):
         if self.kd != 0.0 and self.filter is None:
             raise ModelError(
                 f"{self.title}: a derivative needs a filter; give filter=..., a tenth of kd/kp for instance: the "
-                f"derivative of what jumps is infinite"
+                "derivative of a signal that jumps is infinite"
             )
         positive(self, n, "filter", "tracking")
         for name, needs, there in (
@@ -107,7 +107,7 @@ class PID(Controller):
                 raise ModelError(f"{self.title}: {name} does nothing without {needs}; leave it out")
         if self.windup == BACK and self.tracking is None and self.kp == 0.0 and self.kd == 0.0:
             raise ModelError(
-                f"{self.title}: without kp and kd nothing tells how fast the integral follows; give tracking"
+                f"{self.title}: without kp and kd the rate of the back-calculation is not determined; give tracking"
             )
         if isinstance(self.lower, str) and isinstance(self.upper, str):
             same_kind(self.lower, self.upper, f"{self.title}: lower")
@@ -130,8 +130,8 @@ class PID(Controller):
         if state != "integral" or self.windup != CLAMPING:
             return ""
         return (
-            f"anti_windup={CLAMPING!r} stops the integral and lets it go again: give anti_windup={BACK!r}, which leads "
-            f"it back smoothly, or 'none'"
+            f"anti_windup={CLAMPING!r} stops and restarts the integral abruptly: give anti_windup={BACK!r}, which "
+            "changes it smoothly, or 'none'"
         )
 
     def given(self) -> dict[str, Any]:

@@ -41,11 +41,11 @@ class Transfer(Controller):
         if n.den[0] == 0.0:
             raise ModelError(f"{self.title}: the first coefficient of den is zero; leave leading zeros out")
         if not self.num:
-            raise ModelError(f"{self.title}: num has no coefficients; num=[0] says nothing")
+            raise ModelError(f"{self.title}: num has no coefficients; num=[0] has no effect")
         if len(self.num) > len(self.den):
             raise ModelError(
-                f"{self.title}: num is of order {len(self.num) - 1}, den of order {len(self.den) - 1}; what "
-                f"differentiates has no states: add a filter, a factor (1 + T s) in den"
+                f"{self.title}: num is of order {len(self.num) - 1}, den of order {len(self.den) - 1}; a transfer "
+                "function that differentiates has no state-space form: add a filter, a factor (1 + T s) in den"
             )
 
     @property

@@ -98,9 +98,9 @@ def nonsmooth_error(found: Sequence[NonsmoothPoint], t: float, so: str) -> Singu
     """The error that describes nonsmooth points."""
     texts = "; ".join(dict.fromkeys(k.text for k in found))
     return SingularityError(
-        f"{texts}. What is so on one side only says nothing of the other, so {so}. Move the mechanism away from there, "
-        f"or write what is smooth: sqrt(x**2 + w**2) for abs(x), tanh(x/w) for sign(x), step(x, x0, y0, x1, y1), a "
-        f"table with interpolation 'cubic'",
+        f"{texts}. Derivatives on one side of such a point do not apply on the other, so {so}. Choose another "
+        "position, or a smooth law: sqrt(x**2 + w**2) for abs(x), tanh(x/w) for sign(x), step(x, x0, y0, x1, y1), a "
+        "table with interpolation 'cubic'",
         t,
         tuple(dict.fromkeys(k.element for k in found)),
     )

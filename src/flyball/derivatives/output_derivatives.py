@@ -227,7 +227,7 @@ def _undetermined_error(x: MechanismState, name: str, part: np.ndarray) -> Model
     of = [r.element.name for r in x.c.structure.rows] + list(x.c.structure.prescribed)
     among = dict.fromkeys(n for n, p in zip(of, part, strict=False) if p > CHANGE_TOLERANCE)
     return ModelError(
-        f"{name!r} is not determined: redundant constraints ({', '.join(among)}) leave it open, and how the "
-        f"load is shared follows from no mechanics of rigid bodies. Ask for other quantities, or take the "
-        f"redundancy out: m.mobility() names it"
+        f"{name!r} is not determined: redundant constraints ({', '.join(among)}) leave it undetermined: rigid-body "
+        "mechanics does not determine how the load is shared. Choose other quantities, or remove the redundancy: "
+        "m.mobility() names it"
     )

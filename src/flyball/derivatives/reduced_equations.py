@@ -265,8 +265,8 @@ def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None
 def singular_position_error(t: float, names: tuple[str, ...]) -> SingularityError:
     """The error that names the elements whose constraints lose rank at a position."""
     return SingularityError(
-        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} "
-        f"depend on each other here and not nearby, so that there is no linear model; move it away from there",
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} are "
+        "dependent here and not nearby, so that there is no linear model; choose another position",
         t,
         names,
     )

@@ -206,9 +206,9 @@ def steady_frame(
         if is_steady(x, e, f, frame):
             return frame
     raise AnalysisError(
-        f"the motion at t = {x.t:.6g} s is no steady one: from no evenly turning frame does it look the same a moment "
-        f"later. Linearise about an equilibrium (about=m.equilibrium()) or a steady motion, or ask for the equations "
-        f"of this very instant with frozen=True"
+        f"the motion at t = {x.t:.6g} s is not steady: it is not constant in any frame that turns uniformly. "
+        "Linearise about an equilibrium (about=m.equilibrium()) or a steady motion, or take the equations of this "
+        "instant with frozen=True"
     )
 
 
@@ -280,8 +280,8 @@ def _refuse_time_dependence(x: MechanismState, e: EquationDerivatives, f: FreeCo
 def time_dependence_error() -> AnalysisError:
     """The error for linear equations that change with time at rest."""
     return AnalysisError(
-        "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
-        "those of this very instant with frozen=True"
+        "the mechanism is at rest, but its force laws depend on time, and so do its linear equations; frozen=True "
+        "gives those of this instant"
     )
 
 

@@ -269,17 +269,17 @@ def evaluate_state(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tu
 
     With POSITION the turns and places in ``y`` are updated.
     """
-    clock = _clock_pool(len(y)).new()
+    clock = idle_clock_pool(len(y)).new()
     clock.array("real").t = t
     state = clock.array("y")[0]
     state[:] = y
-    status = int(engine(S, W, _idle_tableau(), clock, _no_output(), task))
+    status = int(engine(S, W, idle_tableau(), clock, no_output(), task))
     y[:] = state
     return status, clock.array("K")[0]
 
 
 @lru_cache
-def _clock_pool(ny: int) -> StructPool:
+def idle_clock_pool(ny: int) -> StructPool:
     """Pool of integrator states without integration, for states of length ``ny``."""
     none, one = np.zeros(0, np.int64), np.zeros((1, ny))
     return StructPool(
@@ -289,13 +289,14 @@ def _clock_pool(ny: int) -> StructPool:
 
 
 @cache
-def _idle_tableau() -> StructBuffer:
+def idle_tableau() -> StructBuffer:
     """Placeholder tableau for tasks that do not integrate."""
     return StructBuffer(tableau("rk45"))
 
 
 @cache
-def _no_output() -> StructBuffer:
+def no_output() -> StructBuffer:
+    """Output buffer for tasks that write no output."""
     return StructBuffer(OutputBuffer(np.zeros((0, 0))))
 
 

@@ -31,7 +31,7 @@ from ..numerics.event_location.guards import (
     allocate_guard_state,
     predict_sensed,
 )
-from ..numerics.integrators.butcher_tableaux import Tableau, tableau
+from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.explicit_runge_kutta import run_explicit_task
 from ..numerics.integrators.time_loop import (
     TRY_STEP,
@@ -63,7 +63,7 @@ from .calls import (
     engine_tangent,
     set_state,
 )
-from .entry_point import engine, struct_tables
+from .entry_point import engine, idle_tableau, struct_tables
 from .guards import (
     GROUP_ROUNDING,
     ForceDistribution,
@@ -392,12 +392,6 @@ def idle_event_workspace(c: bytes, stages: int) -> StructBuffer:
     """Empty guard workspace, shared by all loops without guards."""
     none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
     return StructBuffer(allocate_guard_state(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
-
-
-@lru_cache(maxsize=1)
-def idle_tableau() -> StructBuffer:
-    """Placeholder tableau for an engine that does not use it."""
-    return StructBuffer(tableau("rk45"))
 
 
 class GuardedLoop:

@@ -43,6 +43,8 @@ BRANCHES = formulas(_HERE, "branch")
 The four numbers of two states within half a turn of each other have a positive product if both states are on one branch
 of the formula.
 """
+ENERGIES = formulas([c for c in _HERE if c.energy is not None], "energy")
+"""Kind -> formula for the energy stored in a force."""
 SIGNATURES = (
     Signature("inputs", "par, F, M", (16, FRAME, FRAME), 2, "two numbers: a quantity and its rate"),
     Signature(

@@ -131,7 +131,8 @@ class Bushing(TwoFrameForce):
     energy: ClassVar = staticmethod(energy)
     symbol: ClassVar[str] = "bushing"
     fails: ClassVar[str] = (
-        "It has been turned by half a turn, where it no longer knows its axis; stop before, or use a joint with springs"
+        "It is turned by half a turn, where the axis of the rotation vector is undefined. End the motion before "
+        "that, or use a joint with springs"
     )
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:

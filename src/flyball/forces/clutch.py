@@ -52,8 +52,8 @@ class CapacityFriction:
         """Require a static ratio of at least 1."""
         if not n.static.real >= 1.0:
             raise ModelError(
-                f"{self.title}: static is {n.static:g}; it must be 1 or greater: what it holds at rest, relative to "
-                f"what it carries while it slips"
+                f"{self.title}: static is {n.static:g}; it must be 1 or greater: the ratio of the largest torque "
+                "while it sticks to the torque while it slips"
             )
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

@@ -219,11 +219,11 @@ class JointFriction(CoordinateForce):
                 and other._coordinate() != self._coordinate()
             ):
                 raise ModelError(
-                    f"{self.title}: {other.title} acts on the surface of {joint.title} already, along "
-                    f"{other.coordinate_text()!r}. One surface has one friction force, mu N against its whole slip, "
-                    f"and two would be up to 1.4 mu N. Leave one out, give the bodies shapes and a "
-                    f"Contact(friction=...) in place of the joint, or put a body between them with a joint for each "
-                    f"motion, if these are two surfaces"
+                    f"{self.title}: {other.title} already acts on the surface of {joint.title}, along "
+                    f"{other.coordinate_text()!r}. One surface has one friction force, mu N against its total slip "
+                    "velocity; two would together give up to 1.4 mu N. Leave one out, give the bodies shapes and a "
+                    "Contact(friction=...) in place of the joint, or put a body between them with a joint for each "
+                    "motion, if these are two surfaces"
                 )
 
     def check(self, n: SimpleNamespace) -> None:

@@ -84,14 +84,14 @@ class Cam(Joint):
     needs_axis: ClassVar[bool] = True
     symbol: ClassVar[str] = "cam"
     one_sided: ClassVar[bool] = True
-    both_sides: ClassVar[str] = ", or say groove=True if the follower is held on both sides"
+    both_sides: ClassVar[str] = ", or give groove=True if the follower is guided on both sides"
 
     def check(self, n: SimpleNamespace) -> None:
         """Require enough points, each with two coordinates, no two consecutive ones equal."""
         nonnegative(self, n, "radius")
         if self.closed and self.beyond != "refuse":
             raise ModelError(
-                f"{self.title}: beyond= has no effect on a closed profile; leave it out, or say closed=False"
+                f"{self.title}: beyond= has no effect on a closed profile; leave it out, or give closed=False"
             )
         if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
             raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
@@ -114,8 +114,8 @@ class Cam(Joint):
         first, last = self.extent(n)
         if last.real > first.real and self.ended(at.real, first.real, last.real):
             raise ModelError(
-                f"{self.title}: its follower is drawn beyond an end of the profile, which goes from "
-                f"{_written(n.points[0])} to {_written(n.points[-1])}; {REMEDY}"
+                f"{self.title}: in the reference configuration its follower is beyond an end of the profile, which "
+                f"extends from {_written(n.points[0])} to {_written(n.points[-1])}; {REMEDY}"
             )
         bend = max(0.0, -self.sharpest(n, side)) * n.radius.real
         if bend >= 1.0:

@@ -38,7 +38,7 @@ class Distance(Joint):
 
     def check(self, n: SimpleNamespace) -> None:
         """The length must be greater than zero."""
-        positive(self, n, "length", why="To hold two points together use Revolute or Spherical")
+        positive(self, n, "length", why="To join two points use Revolute or Spherical")
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """Return frames with origins at the two ends; the axes do not matter."""

@@ -60,7 +60,7 @@ class GearPair(Coupling):
         return 1.0, (-1.0 if self.internal else 1.0) * same * s1 * s2 * n.teeth[1] / n.teeth[0]
 
     def _carrier(self, model: Model) -> str:
-        remedy = "both gears must turn on one carrier: put a Revolute between each gear and the arm that holds them"
+        remedy = "both gears must turn on one carrier: put a Revolute between each gear and the arm that carries them"
         return shared_body(self, model, self.joint_1, self.joint_2, remedy)
 
     def check(self, n: SimpleNamespace) -> None:

@@ -51,6 +51,9 @@ class KnifeEdge(Joint):
         x = np.cross(up, a)
         size = np.sqrt((x * x).sum())
         if not size.real > 1e-6:
-            raise ModelError(f"{self.title}: its normal is along its edge; give the direction in which it stands")
+            raise ModelError(
+                f"{self.title}: its normal is parallel to its edge; give the direction perpendicular to the plane on "
+                "which it rolls"
+            )
         R = np.column_stack([x / size, np.cross(a, x / size), a])
         return (p, R), (p, R)

@@ -60,7 +60,7 @@ class WheelOnLine(Joint):
             raise ModelError(f"{self.title}: its centre lies on the line; the wheel has no radius")
         if abs(d[2].real) > 1e-9 * abs(d[0].real):
             raise ModelError(
-                f"{self.title}: the way from 'at' to the centre must be square to the line; the centre is "
+                f"{self.title}: the vector from 'at' to the centre must be perpendicular to the line; the centre is "
                 f"{d[2].real:g} m further along it"
             )
         return (at, R), (centre, R)

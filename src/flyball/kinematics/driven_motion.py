@@ -107,7 +107,7 @@ def requested_times(times: Times, first: float | None, last: float | None) -> tu
     except (TypeError, ValueError):
         raise ModelError(f"times must be a number of times, or the times [s] themselves, not {times!r}") from None
     if last is not None:
-        raise ModelError("t_end goes with a number of times; these times say themselves when they end")
+        raise ModelError("t_end belongs to a number of output times; an array of times already contains the end")
     if at.ndim != 1 or not len(at) or not np.isfinite(at).all() or not (np.diff(at) > 0).all():
         raise ModelError("times must be finite and in ascending order")
     first = min(0.0, float(at[0])) if first is None else first
@@ -162,8 +162,7 @@ def _over_driven_error(found: Mobility) -> MobilityError:
         others = [n for n in s.elements if n not in s.drivers]
         through = f" through {', '.join(others[:MAX_NAMED])}" if others else ""
         texts.append(f"drivers {', '.join(s.drivers)} prescribe the same motion{through}" if len(s.drivers) > 1
-                     else f"driver {s.drivers[0]} prescribes what "
-                     f"{', '.join(others[:MAX_NAMED])} do already")  # fmt: skip
+                     else f"driver {s.drivers[0]} repeats the motion of {', '.join(others[:MAX_NAMED])}")  # fmt: skip
     return MobilityError(
         f"{model.name!r} is over-driven: {'; '.join(texts)}. Leave out one driver of each set; two laws that agree "
         f"only as far as they are rounded would lock the mechanism",
@@ -214,11 +213,10 @@ def _singular_start_error(found: Mobility) -> SingularityError | None:
         return None
     names = found.redundant
     return SingularityError(
-        f"{c.structure.model.name!r} begins in a singular position at t = {a.t:g} s: the constraints of "
-        f"{', '.join(names[:MAX_NAMED])} are not independent there, so drivers do not decide how it goes on, "
-        f"or cannot start it ({'; '.join(m.name for m in found.motions[:MAX_NAMED])} is free). Draw it a little "
-        "way beside "
-        f"this position, or drive another coordinate",
+        f"{c.structure.model.name!r} starts in a singular position at t = {a.t:g} s: the constraints of "
+        f"{', '.join(names[:MAX_NAMED])} are dependent there, so the drivers do not determine its motion, or cannot "
+        f"start it ({'; '.join(m.name for m in found.motions[:MAX_NAMED])} is free). Start a little away from this "
+        "position, or drive another coordinate",
         where=a.t,
         elements=names,
     )
@@ -251,11 +249,11 @@ def _lock_error(start: InitialState, error: SimulationError) -> SingularityError
     joints = [k for k in names if k not in drivers]
     whose = f"driver{'s' if len(drivers) > 1 else ''} {', '.join(drivers)}" if drivers else "its drivers"
     return SingularityError(
-        f"{model.name!r} locks at t = {t:.6g} s: {whose} cannot move it on through "
-        f"{', '.join(joints[:MAX_NAMED])}, whose "
-        f"constraints lose their independence there. Shorten the way of {'the driver' if drivers else 'its drivers'}, "
-        f"change lengths so that it reaches farther, or drive a coordinate that goes on turning there (singularities() "
-        f"follows the mechanism through such positions). The motion up to there is kept in the error's result",
+        f"{model.name!r} locks at t = {t:.6g} s: {whose} cannot move it further through "
+        f"{', '.join(joints[:MAX_NAMED])}, whose constraints become dependent there. Shorten the range of "
+        f"{'the driver' if drivers else 'its drivers'}, change lengths so that it reaches further, or drive a "
+        "coordinate that keeps turning there (singularities() follows the mechanism through such positions). The "
+        "motion up to there is kept in the error's result",
         where=float(t),
         elements=names,
         result=result,

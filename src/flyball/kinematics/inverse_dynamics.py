@@ -299,8 +299,8 @@ def _samples(label: str, motion: Any, times: np.ndarray) -> tuple[np.ndarray, np
         raise ModelError(f"motion of {label!r}: samples must be finite and their times ascend")
     if t[0] > times[0] or t[-1] < times[-1]:
         raise ModelError(
-            f"motion of {label!r}: its samples reach from {t[0]:g} s to {t[-1]:g} s, the times asked for from "
-            f"{times[0]:g} s to {times[-1]:g} s; nothing says how it moves outside"
+            f"motion of {label!r}: its samples extend from {t[0]:g} s to {t[-1]:g} s, the requested times from "
+            f"{times[0]:g} s to {times[-1]:g} s; the motion outside the samples is not known"
         )
     return t, x
 

@@ -78,7 +78,7 @@ class Prepared:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Raise an error: it is immutable."""
-        raise ModelError(f"{name!r} cannot be set: what is prepared does not change; prepare the changed mechanism")
+        raise ModelError(f"{name!r} cannot be set: a prepared mechanism is constant; prepare the changed mechanism")
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -309,7 +309,7 @@ class Prepared:
         for name, x, known in (("q", q, self.q), ("v", v, self.v)):
             found = np.array(x)
             if found.dtype.kind not in "iuf":
-                raise ModelError(f"{name} holds {found.dtype.name} numbers; coordinates and velocities are real")
+                raise ModelError(f"{name} contains {found.dtype.name} numbers; coordinates and velocities are real")
             if found.shape != known.shape:
                 raise ModelError(
                     f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
@@ -326,7 +326,7 @@ class Prepared:
             return -1, np.zeros(3), np.eye(3)
         e = self.model[name]
         if e.category not in ("bodies", "frames"):
-            raise ModelError(f"{e.title} has no pose; ask for a body or a frame")
+            raise ModelError(f"{e.title} has no pose; name a body or a frame")
         p, R = c.values.poses.named(name)
         body = c.values.bodies[e.body if isinstance(e, Frame) else name]
         b = c.structure.place[e.body if isinstance(e, Frame) else name]

@@ -388,7 +388,7 @@ def compile_law(
         If a name is not known or means two things, a constant part is not finite, or a function has no derivatives.
     """
     if not inputs or inputs[0] != "t" or len(const) < len(parameters):
-        raise ValueError("the first input is 't', and const begins with one value for each parameter")
+        raise ValueError("the first input is 't', and const starts with one value for each parameter")
     _refuse_ambiguous_names(expression, inputs, parameters, sensors)
     known = [*inputs, *sensors, *parameters]
     expression.require(known)

@@ -78,8 +78,8 @@ class CompiledFunction:
 
     def __reduce__(self) -> Any:
         raise TypeError(
-            f"the code of the Python function '{function_name(self.python)}' stands at an address of this process and "
-            f"cannot be sent to another; send the mechanism, or use threads"
+            f"the code of the Python function '{function_name(self.python)}' is at an address of this process and "
+            "cannot be sent to another process; send the mechanism, or use threads"
         )
 
 

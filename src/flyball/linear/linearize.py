@@ -80,9 +80,7 @@ class OperatingPointOptions(Options):
         if self.about is not None and self.t is not None:
             raise ModelError("about has its own time: leave out t")
         if self.frozen and isinstance(self.about, Equilibrium) and not self.about.speeds:
-            raise ModelError(
-                "frozen is about a motion: at an equilibrium nothing moves, and it does nothing; leave it out"
-            )
+            raise ModelError("frozen applies to a motion; it has no effect at an equilibrium, so leave it out")
 
     def state(self, model: Model, many: SizeTest | None = None) -> MechanismState:
         """State at the operating point; in absolute coordinates if ``many`` holds for its velocities and rows."""
@@ -229,9 +227,9 @@ def _refuse_frame_dependence(
                 1e-300 + np.abs(now[k, :n]).max(initial=0.0)
             ):
                 raise ModelError(
-                    f"{what} {name!r} does not turn with the mechanism: seen from the frame in which the motion is "
-                    f"steady it changes with time. Take one that does, such as a joint's coordinate or drive, or ask "
-                    f"for this very instant with frozen=True"
+                    f"{what} {name!r} does not turn with the mechanism: seen in the frame in which the motion is "
+                    "steady it changes with time. Take a quantity that turns with it, such as a joint's coordinate "
+                    "or drive, or linearise at this instant with frozen=True"
                 )
 
 
@@ -386,6 +384,6 @@ def refuse_cumulative_outputs(model: Model, names: Sequence[str]) -> None:
         ):
             instead = "energy.total" if owner == ENERGY else f"{owner}.power"
             raise ModelError(
-                f"output {name!r} counts from the start of a motion on, so no state of a linear model tells it; ask "
-                f"for {instead!r}"
+                f"output {name!r} accumulates from the start of a motion, so it is no function of the states of a "
+                f"linear model; choose {instead!r}"
             )

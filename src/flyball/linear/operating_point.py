@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 SizeTest = Callable[[int, int], bool]
-SPARSE_REASON = "absolute: of so many velocities the equations are sparse there"
+SPARSE_REASON = "absolute: with this many velocities their equations are sparse"
 
 
 def operating_state(
@@ -122,7 +122,7 @@ def _assembly_at_equilibrium(model: Model, about: Equilibrium, parameters: Mappi
         loaded = {name.partition(".")[0] for name in about.preload}
         parts, others = ([e for e in m.elements() if e.name not in loaded] for m in (model, own))
         if parts != others:
-            raise ModelError(f"{model.name!r} is not what it was when its preload was found; find it again")
+            raise ModelError(f"{model.name!r} has changed since its preload was computed; compute it again")
         model = own
     if [b.name for b in model.bodies] != [b.name for b in old.structure.model.bodies]:
         raise ModelError(f"about is an equilibrium of {old.structure.model.name!r}, which has other bodies")
@@ -159,14 +159,14 @@ def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O
     bare, held = model_without_contacts(model, base)
     joined, missing = model_with_contact_joints(bare, place)
     if missing:
-        raise ModelError(f"{analysis} does not know how contacts move: {'; '.join(missing.values())}")
+        raise ModelError(f"{analysis} does not support these contacts: {'; '.join(missing.values())}")
     c = compile_mechanism(bare, parameters=own)
     x = RestState(c, base.t, c.take(base.compiled, base.t, base.q, base.v)[0], np.zeros(len(c.structure.rows)))
     found, bears = support_with_friction(model, place, x, held)
     if found.unbalanced > REST_BALANCE:
         raise AnalysisError(
-            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what "
-            f"acts unbalanced. Ask about=m.equilibrium()"
+            f"{model.name!r} does not rest there: contacts, joints and locked elements leave the fraction "
+            f"{found.unbalanced:.2g} of the forces unbalanced. Give about=m.equilibrium()"
         )
     notes = _contact_notes(touch_states(place, found, x, held, bears), base.t)
     joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()
@@ -202,7 +202,8 @@ def moving_error(model: Model, analysis: str) -> ModelError:
     other = "" if model.contacts or model.bulk else ", or about the end of a motion: about=m.simulate(...)"
     parts = ", ".join(e.title for e in unsupported_elements(model))
     return ModelError(
-        f"{analysis} with {parts} is about rest, and {model.name!r} moves: ask about=m.equilibrium(){other}"
+        f"{analysis} with {parts} is made about a position of rest, and {model.name!r} moves: give "
+        f"about=m.equilibrium(){other}"
     )
 
 
@@ -217,13 +218,13 @@ def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
     limit = tuple(k.name for k in touches if k.state == AT_FRICTION_LIMIT)
     if limit:
         raise SingularityError(
-            f"{', '.join(limit)}: friction is at its limit, so that it sticks one way and slides the other, and there "
-            f"is no linear model",
+            f"{', '.join(limit)}: friction is at its limit: it sticks in one direction and slides in the other, so "
+            "there is no linear model",
             t,
             limit,
         )
     parting = [k.name for k in touches if k.state == ABOUT_TO_PART]
-    return (f"{', '.join(parting)} about to part: what is said holds while it stays closed",) if parting else ()
+    return (f"{', '.join(parting)} about to open: the results are valid while it stays closed",) if parting else ()
 
 
 def _equilibrium_at(at: Assembly) -> Equilibrium:
@@ -276,8 +277,8 @@ def frozen_mode_model(
 
 def _mode_notes(model: Model, removed: dict[str, None], parts: list[Element], slides: list[str]) -> tuple[str, ...]:
     held = {p.name for p in parts}
-    said = ((", ".join(model[n].title for n in held), "held"), (", ".join(slides), "taken to slide on as it does"),
-            (", ".join(model[n].title for n in removed if n not in held), "open, and left out"))  # fmt: skip
+    said = ((", ".join(model[n].title for n in held), "held"), (", ".join(slides), "assumed to keep sliding"),
+            (", ".join(model[n].title for n in removed if n not in held), "open, not in the model"))  # fmt: skip
     return tuple(f"{names}: {what}" for names, what in said if names)
 
 

@@ -428,11 +428,11 @@ class RootLocusOptions(OperatingPointOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         if isinstance(self.about, Equilibrium):
-            raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
+            raise ModelError("root_locus: an equilibrium has its own parameter values; give equilibrium=True")
         if self.about is not None and self.equilibrium:
-            raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
+            raise ModelError("root_locus: give either about or equilibrium=True, which finds the position itself")
         if self.frozen and self.equilibrium:
-            raise ModelError("root_locus: frozen does nothing where nothing moves: leave out frozen or equilibrium")
+            raise ModelError("root_locus: frozen has no effect at an equilibrium: leave out frozen or equilibrium")
 
     def here(self, value: float, about: Equilibrium | None) -> OperatingPointOptions:
         """Operating point at a value; at an equilibrium if that is given."""

@@ -105,7 +105,7 @@ def _several_prescribe(case: ContradictionCase, prescribing: list[str], names: l
         own = case.rows([name])
         x = np.linalg.lstsq(G[~own], case.right[~own], rcond=RANK_TOLERANCE)[0]
         made, asked = float((G[own] @ x)[0]), float(case.right[own][0])
-        said.append(f"{name} asks for {asked:.6g} {case.unit(name)} where the rest gives {made:.6g}")
+        said.append(f"{name} prescribes {asked:.6g} {case.unit(name)} where the other constraints give {made:.6g}")
     through = [k for k in names if k not in prescribing]
     by = f" through {', '.join(through[:MAX_NAMED])}" if through else ""
     who = " and ".join(_prescriber_title(case, name) for name in prescribing[:MAX_NAMED])
@@ -116,15 +116,15 @@ def _nothing_free(case: ContradictionCase, name: str, holding: list[str], rows: 
     """Explain that the other constraints leave no freedom: it is a structure, or needs special dimensions."""
     counted = case.c.structure.nv - rows
     names = ", ".join(holding[:MAX_NAMED])
-    begin = f"{_prescriber_title(case, name)} finds nothing to move: the constraints of {names} leave no freedom"
+    begin = f"{_prescriber_title(case, name)} has nothing to move: the constraints of {names} leave no freedom"
     if counted >= 0 or case.c.structure.model.planar or rank_of(G.toarray()) == rows:
         return (
-            f"{begin}, and counting joints leaves {counted}: it is a structure. Replace a joint by one that holds "
-            f"less, add a body between two of them, or leave the driver out"
+            f"{begin}, and counting joints leaves {counted}: it is a structure. Replace a joint by one with fewer "
+            "constraints, add a body between two of them, or leave the driver out"
         )
     return (
-        f"{begin}. Counting leaves {counted}, so that it moves only where its joints stand in a special way, with axes "
-        f"that are parallel or meet in one point; {_nonparallel_axes(case, holding)}"
+        f"{begin}. Counting leaves {counted}, so that it moves only with special geometry of its joints: axes that "
+        f"are parallel or meet in one point; {_nonparallel_axes(case, holding)}"
     )
 
 
@@ -144,12 +144,12 @@ def _nonparallel_axes(case: ContradictionCase, holding: list[str]) -> str:
         best = same if len(same) > len(best) else best
     odd = [k for k in axes if k not in best]
     if len(best) < 2 or not odd:
-        return "look at their axes and points, or replace a joint by one that holds less, such as Spherical"
+        return "look at their axes and points, or replace a joint by one with fewer constraints, such as Spherical"
     lead = axes[best[0]]
     angles = {k: np.degrees(np.arctan2(np.linalg.norm(np.cross(axes[k], lead)), abs(axes[k] @ lead))) for k in odd}
     said = ", ".join(f"that of {k} is {x:.3g} deg off" for k, x in list(angles.items())[:MAX_NAMED])
     others = ", ".join(best[:MAX_NAMED])
-    return f"the axes of {others} are parallel, {said}. Correct it, or replace a joint by one that holds less"
+    return f"the axes of {others} are parallel, {said}. Correct it, or replace a joint by one with fewer constraints"
 
 
 def _coordinate_not_moved(case: ContradictionCase, name: str, holding: list[str]) -> str:
@@ -169,16 +169,13 @@ def _coordinate_not_moved(case: ContradictionCase, name: str, holding: list[str]
     c.at(case.t, case.q, case.v)
     if not near:
         return (
-            f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r}, which no freedom moves, here "
-            "or nearby; free "
-            f"is {free}. Drive that, or leave it out"
+            f"{_prescriber_title(case, name)} prescribes a motion of {coordinate!r}, which no freedom changes, here "
+            f"or nearby; free is {free}. Drive that, or leave it out"
         )
     return (
-        f"{_prescriber_title(case, name)} asks for a motion of {coordinate!r} at a dead centre: in this "
-        f"position {free} moves it "
-        f"by nothing, next to it it does (constraints of {', '.join(holding[:MAX_NAMED])}). Begin a little way "
-        "beside it, "
-        f"or ask for a motion of {free}"
+        f"{_prescriber_title(case, name)} prescribes a motion of {coordinate!r} at a dead centre: in this position "
+        f"{free} does not change it, at neighbouring positions it does (constraints of "
+        f"{', '.join(holding[:MAX_NAMED])}). Start a little away from it, or prescribe a motion of {free}"
     )
 
 

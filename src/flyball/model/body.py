@@ -281,7 +281,7 @@ class Initial(Element):
     def check(self, n: SimpleNamespace) -> None:
         """Require a value or a rate."""
         if self.value is None and self.rate is None:
-            raise ModelError(f"{self.title}: it says nothing; give value=..., rate=... or both")
+            raise ModelError(f"{self.title}: it has no effect; give value=..., rate=... or both")
 
 
 @element
@@ -354,13 +354,13 @@ def _read(path: Path) -> np.ndarray:
     """Read an array from a NumPy file, or from comma-separated text."""
     kind = path.suffix.lower()
     if kind not in (".npy", ".csv"):
-        raise ValueError("give an array of numbers, or the path of a file '*.npy' or '*.csv' that holds one")
+        raise ValueError("give an array of numbers, or the path of a file '*.npy' or '*.csv' that contains one")
     try:
         return np.load(path, allow_pickle=False) if kind == ".npy" else np.loadtxt(path, delimiter=",", ndmin=1)
     except OSError as error:
         raise ValueError(f"cannot read {os.fspath(path)!r}: {error.strerror or error}") from None
     except ValueError as error:
-        raise ValueError(f"{os.fspath(path)!r} holds no array of numbers: {error}") from None
+        raise ValueError(f"{os.fspath(path)!r} contains no array of numbers: {error}") from None
 
 
 def _numbers(value: Any) -> Any:
@@ -503,7 +503,7 @@ class Bodies(Element):
         given |= dict.fromkeys(("inertia_about", "inertia_axes", "com"))
         found = mass_properties(self.one, SimpleNamespace(**given), env, planar)
         if not found.mass.real > 0.0:
-            raise ModelError(f"{self.title}: its mass is 0, and what touches needs one")
+            raise ModelError(f"{self.title}: its mass is 0, and a body in contact needs one")
         return found
 
     def start(self, planar: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -88,7 +88,7 @@ def check_law(e: Element, n: SimpleNamespace) -> None:
         raise ModelError(f"{e.title}: law='linear' needs stiffness=..., a number in N/m")
     if getattr(n, "restitution", None) is not None:
         how = {LINEAR: "damping=", HUNT_CROSSLEY: "dissipation="}.get(n.law)
-        remedy = f"say what is lost by {how}" if how else "take law='hunt-crossley', which loses some"
+        remedy = f"give the losses by {how}" if how else "take law='hunt-crossley', which loses some"
         raise ModelError(f"{e.title}: restitution is of hard contact; with law={n.law!r} {remedy}")
     _check_unit(e, unit_of_stiffness(n))
 
@@ -123,7 +123,7 @@ def check_elasticity(e: Element, n: SimpleNamespace) -> None:
     if (n.youngs_modulus is None) != (n.poissons_ratio is None):
         names = ("youngs_modulus", "poissons_ratio")
         given, other = names if n.poissons_ratio is None else names[::-1]
-        raise ModelError(f"{e.title}: {given} needs {other} as well: how a surface gives way follows from both")
+        raise ModelError(f"{e.title}: {given} needs {other} as well: the stiffness of a surface follows from both")
     if n.poissons_ratio is not None and not -1.0 < n.poissons_ratio.real <= 0.5:
         raise ModelError(
             f"{e.title}: poissons_ratio is {n.poissons_ratio:g}; it must be above -1 and at most 0.5, as 0.3 of steel"
@@ -230,12 +230,12 @@ class Material(Element):
         check_elasticity(self, n)
         if two and not n.friction[0].real > 0.0:
             raise ModelError(
-                f"{self.title}: friction along the grain is 0; it must be greater than 0. What is smooth one way only "
-                f"has its grain the other way: swap the numbers and turn the grain"
+                f"{self.title}: friction along the grain is 0; it must be greater than 0. For a surface that is "
+                "smooth in one direction, swap the numbers and turn the grain by a right angle"
             )
         if two != (n.grain is not None):
             raise ModelError(
-                f"{self.title}: friction has two numbers; say the direction of the first: grain=(1, 0, 0)"
+                f"{self.title}: friction has two numbers; give the direction of the first: grain=(1, 0, 0)"
                 if two
                 else f"{self.title}: grain has no effect, since friction is one number; leave it out"
             )
@@ -287,7 +287,7 @@ class MaterialPair(Element):
         check_law(self, n)
         if all(getattr(n, k) is None for k in (*SURFACE_NUMBERS, "law")):
             raise ModelError(
-                f"{self.title}: it says nothing; give friction=, restitution= or another of {SURFACE_NUMBERS}"
+                f"{self.title}: it has no effect; give friction=, restitution= or another of {SURFACE_NUMBERS}"
             )
 
 
@@ -386,7 +386,7 @@ class Contact(Element):
         check_surface(self, n)
         check_law(self, n)
         if self.others is not None and self.between is None:
-            raise ModelError(f"{self.title}: others says what between touches; give between=...")
+            raise ModelError(f"{self.title}: others= needs between=, the bodies that they touch; give between=...")
         for a, b in self.exclude:
             if a == b:
                 raise ModelError(f"{self.title}: exclude names {a!r} twice; a body does not touch itself")
@@ -544,8 +544,8 @@ def _refuse_second(model: Model, e: Contact) -> None:
     other = next((c for c in model.contacts if c.name != e.name and c.between is None), None)
     if other is not None and e.between is None:
         raise ModelError(
-            f"{e.title}: {other.title} holds for everything already; say between= what this one holds, or give them "
-            f"materials"
+            f"{e.title}: {other.title} already applies to all bodies; name with between= those of this one, or give "
+            "them materials"
         )
 
 
@@ -576,8 +576,8 @@ def _refuse_common(model: Model, e: Contact, other: Contact, a: str, b: str) -> 
     if a != b or isinstance(model.find(a), Bodies):
         a, b = sorted((a, b))
         raise ModelError(
-            f"{e.title}: {other.title} holds for {a!r} and {b!r} already; two contacts that name bodies must be about "
-            f"different pairs"
+            f"{e.title}: {other.title} already applies to {a!r} and {b!r}; two contacts that name bodies must name "
+            "different pairs"
         )
 
 

@@ -53,8 +53,8 @@ def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode
     a, b = parts
     if a.kind == "number" and abs(a.value - 1.0) <= SINGULAR_GAIN:
         raise ModelError(
-            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, which "
-            f"leaves it open: {ring}. Have one of them go through a state, as a Lag or an Integrator has"
+            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, so it is "
+            f"not determined: {ring}. Add a state to this loop, with a Lag or an Integrator"
         )
     return _over(b, _plus(ONE, _minus(a)))
 
@@ -350,9 +350,9 @@ def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
         owner = name.partition(".")[0]
         if owner in controllers_by_name(model):
             raise ModelError(
-                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes "
-                f"a motion and needs "
-                f"two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller says"
+                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes a motion and "
+                "needs two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller "
+                "sets"
             )
 
 

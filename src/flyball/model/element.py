@@ -245,8 +245,8 @@ class Element:
         other = Element.registry.get(cls.__name__)
         if other is not None and _is_built_in(other) != _is_built_in(cls):
             raise ModelError(
-                f"the class {cls.__name__} of {cls.__module__} and that of {other.__module__} have one name, by which "
-                f"model files know an element; give the class of your own another name"
+                f"the class {cls.__name__} of {cls.__module__} and that of {other.__module__} have the same name, and "
+                "model files identify elements by it; give your own class another name"
             )
         Element.registry[cls.__name__] = cls
         Element.modules.setdefault(cls.__name__, set()).add(cls.__module__)
@@ -262,8 +262,8 @@ class Element:
         """
         if len(modules := Element.modules[name]) > 1:
             raise ModelError(
-                f"{where}type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file knows a "
-                f"type by its name: give the classes different names, or import one of the modules only"
+                f"{where}type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file identifies "
+                "a type by its name: give the classes different names, or import one of the modules only"
             )
         return Element.registry[name]
 

@@ -115,8 +115,8 @@ def _law_with_input(model: Model, e: Driver | Force, law: Any, of: LawOf, parame
 
 DECIDING_OPERATORS = ("<", "<=", "sign")
 SMOOTH_ALTERNATIVES = (
-    "Write what is smooth, for instance step(x, x0, y0, x1, y1) or tanh(x/width), "
-    "and max(0, x) for a force that sets in"
+    "Write a smooth law, for instance step(x, x0, y0, x1, y1) or tanh(x/width), and max(0, x) for a force that "
+    "begins at 0"
 )
 
 

@@ -148,7 +148,7 @@ class Impulse(Action):
     axes: Literal["world", "body"] = "world"
 
     hints: ClassVar[dict[str, str]] = {
-        k: "an Impulse is a blow at an event; choices of steps by impulses are fb.Stepping(step=...)"
+        k: "an Impulse is an action of an event; options of impulse time stepping are fb.Stepping(step=...)"
         for k in (
             "step",
             "solver",
@@ -316,8 +316,8 @@ def comparison_sides(text: str, e: Event) -> tuple[str, str] | None:
             found.append(k)
         if depth == 0 and c == "=" and text[k - 1 : k] not in ("<", ">"):
             raise ModelError(
-                f"when of {e.title}: {text!r} asks for equality; write the difference, as in 'A.angle - 1', and "
-                f"direction='either'"
+                f"when of {e.title}: {text!r} is an equality; write the difference, as in 'A.angle - 1', and "
+                "direction='either'"
             )
     if not found:
         return None

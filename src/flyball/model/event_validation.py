@@ -61,7 +61,7 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
         if own and (isinstance(a, Lock) or _locked_somewhere(model, e, {a.what, *own})):
             return LockTarget(own)
         if not found.rows(model.planar):
-            raise ModelError(f"{what}: {found.title} holds nothing that could be released")
+            raise ModelError(f"{what}: {found.title} has nothing that can be released")
         return LockTarget(joint=a.what)
     if found is not None and (found.category == "limits" or getattr(found, "single", "") == "rope"):
         return LockTarget(element=a.what)
@@ -74,8 +74,8 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
     if found.category in ("bodies", "frames"):
         axes = "x, y, angle" if model.planar else "x, y, z"
         raise ModelError(
-            f"{what}: {found.title} has the coordinates {axes}; name one, as in '{a.what}.x', or hold it by a Fixed "
-            f"joint that another event releases"
+            f"{what}: {found.title} has the coordinates {axes}; name one, as in '{a.what}.x', or fix it with a Fixed "
+            "joint that another event releases"
         )
     raise ModelError(
         f"{what}: {found.title} is no joint, coordinate, limit or rope; a force is switched off by fb.Set of a "
@@ -165,8 +165,8 @@ def _check_action(model: Model, e: Event, a: Action) -> None:
 def _refuse_driven(e: Event, a: Action, d: Driver, text: str) -> None:
     if d.coordinate == text:
         raise ModelError(
-            f"{e.title}: {a.title}: {d.title} prescribes {text!r}, so nothing can be locked there; use an "
-            f"Actuator or a Motor, or a law that stands still: where(t < 1, t, 1)"
+            f"{e.title}: {a.title}: {d.title} prescribes {text!r}, so nothing can be locked there; use an Actuator or "
+            "a Motor, or a law that becomes constant: where(t < 1, t, 1)"
         )
 
 
@@ -178,7 +178,7 @@ def _check_impulse(model: Model, e: Event, a: Impulse) -> None:
     found = model.find(a.on)
     if isinstance(found, (Body, Frame)) or a.on == GROUND:
         if model.carrier(a.on, e) == GROUND:
-            raise ModelError(f"{what}: a blow on ground moves nothing; name a body")
+            raise ModelError(f"{what}: an impulse on ground has no effect; name a body")
         n = 2 if model.planar else 3
         _components(what, "impulse", a.impulse, n, "(0, 1)" if model.planar else "(0, 0, 1)")
         _components(what, "torque", a.torque, 1 if model.planar else 3, "0.5" if model.planar else "(0, 0, 0.5)")
@@ -236,6 +236,6 @@ def _refuse_contradictions(model: Model, e: Event) -> None:
         for key in keys:
             if key in done:
                 first = done[key]
-                rule = "each is said once" if type(first) is type(a) else "they contradict each other"
+                rule = "each may be given once" if type(first) is type(a) else "they contradict each other"
                 raise ModelError(f"{e.title}: {first.title} and {a.title} are both in do, and {rule}; leave one out")
             done[key] = a

@@ -286,10 +286,10 @@ _BARE = re.compile(r"(?<![\w.])\d[\d.]*(?:[eE][+-]?\d+)?\s+[^\W\d][\w/*^]*")  # 
 
 def _remedy(text: str) -> str:
     if bare := _BARE.search(text):
-        return f"{_ALLOWED}; a quantity in a formula stands in parentheses, here ({bare[0]})"
+        return f"{_ALLOWED}; a quantity in a formula must be in parentheses, here ({bare[0]})"
     if any(a.isdigit() and b.isalpha() for a, b in pairwise(text)):
-        return "write every multiplication, as in 2*x; a quantity in a formula stands in parentheses: 2*(5 mm)"
-    return _ALLOWED + "; a quantity in a formula stands in parentheses, as in (60 rpm)*t"
+        return "write every multiplication, as in 2*x; a quantity in a formula must be in parentheses: 2*(5 mm)"
+    return _ALLOWED + "; a quantity in a formula must be in parentheses, as in (60 rpm)*t"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -320,7 +320,7 @@ def function_tree(function: Callable[..., Any]) -> tuple[str, SyntaxNode]:
     try:
         parameters = inspect.signature(function).parameters.values()
     except (ValueError, TypeError):
-        _refuse(name, "does not tell the names of its arguments", "wrap it: def law(t): ...")
+        _refuse(name, "does not expose the names of its arguments", "wrap it: def law(t): ...")
     text = f"<{name}("
     args: list[SyntaxNode] = []
     for p in parameters:

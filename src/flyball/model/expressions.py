@@ -114,7 +114,7 @@ class Expression:
         elif guess:
             cure = guess.strip()
         elif self.function is not None:
-            cure = "the names of a function's arguments say what it is given: use known ones, or give a default"
+            cure = "the names of a function's arguments select its inputs: use known ones, or give a default"
         elif is_unit(name):
             cure = f"a unit follows a single number, as in '2 {name}', in a formula within parentheses"
         else:

@@ -290,7 +290,7 @@ class Latch(Unilateral):
             check_same_kind(self, model, *self.along())
 
 
-def check_elastic(e: Element, n: SimpleNamespace, rigid: str = "a rigid one, which gives no way") -> None:
+def check_elastic(e: Element, n: SimpleNamespace, rigid: str = "a rigid one, which does not deform") -> None:
     """Refuse an invalid stiffness, and fields of the other kind of stop."""
     positive(e, n, "stiffness", why=f"Leave it out for {rigid}")
     nonnegative(e, n, "damping")

@@ -155,7 +155,7 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
     """
     if n.mass is not None and not n.mass.real > 0.0 and not _is_massless(n):
         why = (
-            "A ring or link without mass, which joints hold, has inertia=0 too; a massless link is also a Distance"
+            "A massless ring or link between joints has inertia=0 too; a massless link is also a Distance"
             if n.mass == 0.0
             else "Check its sign and unit"
         )
@@ -227,7 +227,7 @@ def _from_shapes(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> M
         raise ModelError(f"{body.title}: its inertia is missing; {why}give {hint}, 0 for a point mass, or a shape")
     for field in ("inertia_about", "inertia_axes"):
         if getattr(n, field) is not None:
-            raise ModelError(f"{body.title}: {field} says how inertia= is counted, which is not given; leave it out")
+            raise ModelError(f"{body.title}: {field} is the reference of inertia=, which is not given; leave it out")
     found = shape_masses(body, n, heavy)
     com = found.com * np.array([1.0, 1.0, 0.0]) if planar else found.com
     if n.com is not None:

@@ -134,7 +134,7 @@ def _by_name(model: Model) -> dict[str, Element]:
     for category in CATEGORIES:
         parts = getattr(model, category)
         if any(getattr(e, "category", None) != category for e in parts):
-            raise ModelError(f"{category} of {model.name!r} hold something else: {parts!r}; use m.add")
+            raise ModelError(f"{category} of {model.name!r} contain something else: {parts!r}; use m.add")
         names = [e.name for e in parts]
         if len(set(names)) < len(names) or (category != Initial.category and not there.keys().isdisjoint(names)):
             twice = next(x for k, x in enumerate(names) if x in names[:k] or x in there)

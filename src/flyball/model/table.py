@@ -51,7 +51,7 @@ class Table(Element):
 
     category: ClassVar[str] = "tables"
     hints: ClassVar[dict[str, str]] = {
-        "outside": "it is called beyond, and is 'hold', 'line' (once 'linear') or 'repeat' (once 'periodic')"
+        "outside": "this field is now beyond: 'hold', 'line' (formerly 'linear') or 'repeat' (formerly 'periodic')"
     }
 
     def check(self, n: SimpleNamespace) -> None:
@@ -96,12 +96,12 @@ class Table(Element):
         """Return the message on a missing value at ``x`` [SI], with remedies."""
         unit = f" {self.x_unit}" if self.x_unit else ""
         written = x / (to_si(f"1 {self.x_unit}", None) if self.x_unit else 1.0)
-        at = f"for x = {written:.6g}{unit}"
+        at = f"x = {written:.6g}{unit}"
         if any(f"{end:.6g}" == f"{written:.6g}" for end in (self.x[0], self.x[-1])):
-            at = f"for what is just beyond x = {written:.6g}{unit}"
+            at = f"a point just beyond x = {written:.6g}{unit}"
         return (
-            f"{self.title} is asked {at}, and its points go from {self.x[0]:g} to {self.x[-1]:g}{unit}; give it more "
-            f"points, or say what is beyond them: beyond='hold', 'line' or 'repeat'"
+            f"{self.title} is evaluated at {at}, and its points extend from {self.x[0]:g} to {self.x[-1]:g}{unit}; "
+            "give it more points, or choose its values beyond them: beyond='hold', 'line' or 'repeat'"
         )
 
     @cached_property

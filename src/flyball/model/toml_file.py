@@ -93,7 +93,7 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
     try:
         text.encode()
     except UnicodeEncodeError as error:
-        raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
+        raise ModelError(f"{model.name!r} cannot be written: a text contains {error.object[error.start]!r}") from None
     return text
 
 
@@ -113,8 +113,8 @@ def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
         for law in value if isinstance(value, (list, tuple)) else (value,):
             if callable(law):
                 raise ModelError(
-                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot hold a "
-                    f"Python function; use an expression or a Table"
+                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot "
+                    "contain a Python function; use an expression or a Table"
                 )
 
 
@@ -343,7 +343,7 @@ def _elsewhere(name: Any) -> str:
     for _, room in MANY_KINDS.values():
         importlib.import_module(f"..{room}", __package__)
     kind = Element.registry.get(str(name))
-    return f"a {name} stands in a table [[{kind.category}]]" if kind and kind.category in MANY_KINDS else ""
+    return f"a {name} belongs in a table [[{kind.category}]]" if kind and kind.category in MANY_KINDS else ""
 
 
 def _refuse(error: Exception, where: str) -> NoReturn:

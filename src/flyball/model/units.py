@@ -319,7 +319,7 @@ def refuse_attached(number: str, unit: str, names: Collection[str], dimension: s
     as_unit = f"; for the unit '{number} {unit[: match.start()]}{long}{unit[match.end() :]}'"
     if symbol == "t" and "t" not in names:
         raise UnitError(
-            f"'{text}': 't' stands for time behind a unit, and time is known only in laws of drivers and forces; write "
+            f"'{text}': 't' after a unit is time, and time is defined only in laws of drivers and forces; write "
             f"'{product_text(number, unit, match.start())}' there{as_unit}"
         )
     raise UnitError(
@@ -358,7 +358,7 @@ def quantity_remedy(number: str, unit: str) -> str:
     for match in _SYMBOL.finditer(unit):
         if not unit_name(match[0]) and match.start() > 0:
             return f"; if you mean a product, write '{product_text(number, unit, match.start())}'"
-    return "; in a formula a quantity stands in parentheses, as in '(60 rpm)*t'" if _FORMULA.search(unit) else ""
+    return "; in a formula a quantity must be in parentheses, as in '(60 rpm)*t'" if _FORMULA.search(unit) else ""
 
 
 def product_text(number: str, unit: str, start: int) -> str:

@@ -66,9 +66,9 @@ def refuse_unsupported(
         return
     without = ", ".join(f"{e.name!r}: None" for e in parts)
     raise ModelError(
-        f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows "
-        f"{_unsupported_in_words(parts)}; simulate "
-        f"does. Without them: m.changed({{{without}}}).{analysis}(...){_replacement_hint(parts)}"
+        f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} supports "
+        f"{_unsupported_in_words(parts)}; simulate does. Without them: "
+        f"m.changed({{{without}}}).{analysis}(...){_replacement_hint(parts)}"
     )
 
 
@@ -83,8 +83,8 @@ def refuse_controllers(model: Model, analysis: str) -> None:
     if model.controllers:
         titles = ", ".join(e.title for e in model.controllers)
         raise ModelError(
-            f"{model.name!r} has {titles}, and {analysis} knows no controllers; simulate and linearize do. Ask it of "
-            f"a copy whose laws have formulas in their place"
+            f"{model.name!r} has {titles}, and {analysis} does not support controllers; simulate and linearize do. "
+            "Use a copy of the mechanism whose laws have formulas in their place"
         )
 
 
@@ -92,7 +92,7 @@ def _unsupported_in_words(parts: list[Element]) -> str:
     """Describe the unsupported parts."""
     kinds = {e.category for e in parts}
     said = ["no contact, limits or Bodies"] if kinds & set(CONTACT_CATEGORIES) else []
-    said += ["nothing that sticks, locks or goes taut"] if kinds - {*CONTACT_CATEGORIES, "events"} else []
+    said += ["no elements with modes (stick friction, locks, ropes)"] if kinds - {*CONTACT_CATEGORIES, "events"} else []
     said += ["no events"] if "events" in kinds else []
     return ", and ".join(said)
 

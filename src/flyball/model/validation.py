@@ -162,7 +162,7 @@ def check_joint(model: Model, e: Joint, n: Any) -> None:
 def check_by_frames(model: Model, e: Joint | TwoFrameForce) -> None:
     """Require frames for an element without ``at``."""
     if all(name == GROUND or isinstance(model[name], Body) for name in (e.body_i, e.body_j)):
-        raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
+        raise ModelError(f"{e.title}: give its position: at=... in world coordinates, or name frames of the bodies")
 
 
 def refuse_ambiguous_names(
@@ -245,8 +245,8 @@ def checked_law(
         return None
     if driver and callable(value):
         raise ExpressionError(
-            f"{where} is the Python function '{function_name(value)}', whose derivatives a driver cannot know; "
-            f"give an expression, or a Table that is called in one"
+            f"{where} is the Python function '{function_name(value)}', which gives no derivatives, and a driver needs "
+            "two; give an expression, or a Table that is called in one"
         )
     tables = {x.name: x for x in model.tables}
     names = model.names_in_laws(of)

@@ -144,7 +144,7 @@ class Comparison:
         for f in self.formulations:
             more = f"; here coordinates changed places {f.exchanges} times" if f.exchanges else ""
             out.append((f"{f.name} is", f.meaning + more))
-        size = "" if np.isnan(self.energy) else f"; its kinetic energy reaches {self.energy:.3g} J"
+        size = "" if np.isnan(self.energy) else f"; its largest kinetic energy is {self.energy:.3g} J"
         return [*out, ("reference", self.reference + size)]
 
     def as_dict(self) -> dict[str, Any]:

@@ -15,8 +15,8 @@ defect.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,8 @@ from ..model.joint import Joint
 from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 from ..numerics.integrators.radau_stages import RADAU_A as RADAU
 from ..tables.law_inputs import forces_in_events
-from .energy_balance import EnergyBudget, budgets_by_part, kinetic_energy_gain, lag_warning, total_budget
+from ..tables.structure_definition import velocity_names
+from .energy_balance import EnergyBudget, budgets_by_part, lag_warning
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -119,9 +120,9 @@ def transverse_slip_warnings(result: Result) -> list[str]:
                 found.append(
                     f"{f.title} acts along {own!r} only, where the surface slips {along:.3g} {slips[own][1]}; along "
                     f"{text!r} it slips {way:.3g} {unit} without friction. One surface has one friction force, mu N "
-                    f"against its whole slip, so that while it slips along {text!r} little force moves it along "
-                    f"{own!r}. Give the bodies shapes and a Contact(friction=...) in place of the joint, or put a body "
-                    f"between them with a joint for each motion, if these are two surfaces"
+                    f"against its total slip velocity: while it slips along {text!r}, a small force moves it along "
+                    f"{own!r}. Give the bodies shapes and a Contact(friction=...) in place of the joint, or put a "
+                    "body between them with a joint for each motion, if these are two surfaces"
                 )
     return found
 
@@ -156,9 +157,9 @@ def orientation_error_warning(result: Result) -> str:
     if not off > MAX_ORIENTATION_ERROR:
         return ""
     return (
-        f"{name!r} turns by up to {turn:.2g} rad a step, which method={result.health.options['method']!r} is not exact "
-        f"for: by that alone its angle comes to be off by about {off:.2g} rad, whatever the energy balance says; give "
-        f"a shorter step"
+        f"{name!r} turns by up to {turn:.2g} rad per step. The error of method={result.health.options['method']!r} in "
+        f"rotations that large makes its angle wrong by about {off:.2g} rad, which the energy balance does not show; "
+        "give a shorter step"
     )
 
 
@@ -205,7 +206,7 @@ def _radau_turns(x: np.ndarray) -> np.ndarray:
     return out
 
 
-DEFECT_PART = 0.1  # defect relative to a body's largest acceleration
+DEFECT_PART = 0.1  # defect relative to the largest acceleration of a velocity
 DEFECT_SHARE = 0.1  # part of the output times at which larger defects are accepted: jumps and short transients
 OUTPUTS_PER_STEP = (
     2  # least average number of outputs per step: else the velocities between outputs are not on one polynomial
@@ -219,63 +220,59 @@ MIN_OUTPUTS = 16  # least number of output times
 def acceleration_defect_warning(result: Result) -> str:
     """Return a warning on accelerations that are not the rates of the velocities; nothing otherwise.
 
-    Of 1100 random motions, stiff ones among them, at tolerances from 0.1 to 1e-7, there was no false warning; and no
-    warning at all at 1e-4 and less.
+    It compares accelerations with the slopes of neighbouring velocities: at recorded times, or at all where they are
+    known. Of 1100 random motions,
+    stiff ones among them, at tolerances from 0.1 to 1e-7, there was no false warning; and no warning at all at 1e-4
+    and less.
     """
-    steps = result.health.steps
+    steps, names = result.health.steps, velocity_names(result.values.structure)
     if (
         not 0 < OUTPUTS_PER_STEP * steps <= len(result.t)
         or len(result.t) < MIN_OUTPUTS
         or result.health.contact is not None
+        or not names
     ):
         return ""
-    found = (_worst_defect(piece, angular) for piece in result.pieces or (result,) for angular in (False, True))
-    often, name, off, own, unit = max(found, default=(0.0, "", 0.0, 0.0, ""))
-    if not often > DEFECT_SHARE:
+    metric = np.array([n.unit == "m" for n in names])
+    often, worst = _worst_defect(result, metric)
+    k = int(np.argmax(often))
+    if not often[k] > DEFECT_SHARE:
         return ""
     finer = "shorter step" if result.health.options.get("step") else "smaller rtol"
+    unit = "m/s^2" if metric[k] else "rad/s^2"
+    off, own = (f"{x[k]:.2g} {unit}" for x in worst)
     return (
-        f"accelerations, and forces and reactions with them, are rough: that of {name!r} misses the rate of its "
-        f"velocity by up to {off:.2g} {unit}, where that comes to {own:.2g} {unit}; a {finer} makes them better"
+        f"accelerations are inaccurate, and so are forces and reactions: that of {names[k].name!r} differs from the "
+        f"rate of its velocity by up to {off}, and its largest value is {own}. Give a {finer}"
     )
 
 
-def _worst_defect(r: Result, angular: bool) -> tuple[float, str, float, float, str]:
-    """The fraction of output times with a defect of a body, its name, the defect, the reference, and the unit."""
-    S, length, inner = r.values.system, r.values.length, slice(2, -2)
-    rows = np.flatnonzero(np.r_[True, np.diff(r.t) > 0.0])
-    t, unit = r.t[rows], "rad/s^2" if angular else "m/s^2"
-    if len(t) < MIN_OUTPUTS:
-        return 0.0, "", 0.0, 0.0, unit
-    least = (
-        REFERENCE_PART
-        * (float(np.linalg.norm(S.gravity)) + length / float(np.ptp(t)) ** 2)
-        / (length if angular else 1.0)
-    )
-    found = []
-    for name, b in r.values.structure.place.items():
-        if b < 0:
-            continue
-        _, _, w, v, alpha, a = r.records.body(b)
-        v, a = (np.transpose(x)[rows] for x in ((w, alpha) if angular else (v, a)))
-        near = _parabola_rate(t, v, 1)
-        unsure = 2.0 * np.linalg.norm((near - _parabola_rate(t, v, 2))[inner], axis=1)
-        off = np.linalg.norm((a - near)[inner], axis=1) - unsure
-        found.append((name, off, float(np.linalg.norm(near[inner], axis=1).max())))
-    least = max(least, REFERENCE_PART * max((own for _, _, own in found), default=0.0))
-    parts = (
-        (float((off > DEFECT_PART * max(own, least)).mean()), n, float(off.max()), own, unit) for n, off, own in found
-    )
-    return max(parts, default=(0.0, "", 0.0, 0.0, unit))
+def _worst_defect(r: Result, metric: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Return the part of the recorded times with a defect of each velocity, and its largest defect and acceleration."""
+    S, length, n = r.values.system, r.values.length, len(r.t)
+    rows, vdot = (r.record.rows, r.record.figures.vdot) if r.record.deferred else (np.arange(n), r.vdot)
+    ascends = np.diff(r.t) > 0.0
+    regular = np.zeros(n, bool)  # no two times are equal there and at the two rows before and after
+    regular[2:-2] = ascends[:-3] & ascends[1:-2] & ascends[2:-1] & ascends[3:]
+    inner = np.isfinite(vdot).all(axis=1) & regular[rows]
+    none = np.zeros(len(metric))
+    if not inner.any():
+        return none, (none, none)
+    rows, vdot = rows[inner], vdot[inner]
+    near, wide = (_parabola_rate(r.t, r.v, rows, k) for k in (1, 2))
+    off = np.abs(vdot - near) - 2.0 * np.abs(near - wide)
+    largest = np.abs(near).max(axis=0)
+    least = float(np.linalg.norm(S.gravity)) + length / float(np.ptp(r.t)) ** 2
+    fastest = [np.max(largest[kind], initial=0.0) for kind in (~metric, metric)]
+    reference = REFERENCE_PART * np.where(metric, max(least, fastest[1]), max(least / length, fastest[0]))
+    return (off > DEFECT_PART * np.maximum(largest, reference)).mean(axis=0), (off.max(axis=0), largest)
 
 
-def _parabola_rate(t: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
-    """Return at every time the derivative of the parabola through it and those k before and after; nan at the ends."""
-    out = np.zeros_like(v)
-    before, after = (t[k:-k] - t[: -2 * k])[:, None], (t[2 * k :] - t[k:-k])[:, None]
-    slopes = (v[k:-k] - v[: -2 * k]) / before, (v[2 * k :] - v[k:-k]) / after
-    out[k:-k] = (slopes[0] * after + slopes[1] * before) / (before + after)
-    return out
+def _parabola_rate(t: np.ndarray, v: np.ndarray, rows: np.ndarray, k: int) -> np.ndarray:
+    """Return at some rows the derivative of the parabola through the values there and k rows before and after."""
+    before, after = (t[rows] - t[rows - k])[:, None], (t[rows + k] - t[rows])[:, None]
+    slopes = (v[rows] - v[rows - k]) / before, (v[rows + k] - v[rows]) / after
+    return (slopes[0] * after + slopes[1] * before) / (before + after)
 
 
 DEFAULT_IMBALANCE = 1e-4  # relative to the energy moved: larger imbalances are reported if no tolerance was given
@@ -306,12 +303,31 @@ REST_SPEED = 1e-7  # lengths of the mechanism per second that count as rest
 MIN_CREEP = 1e-3  # relative to the mechanism's length: larger creep is reported
 
 
+def impulse_judgements(result: Result, mobility: Callable[[], Any]) -> dict[str, Callable[[], Any]]:
+    """Return the figures of `Health.late` of impulse time stepping, whose accelerations are means."""
+    return {
+        "mobility": mobility,
+        "energy_drift": partial(energy_drift, result),
+        "warnings": partial(impulse_stepping_warnings, result),
+        "doubtful": partial(impulse_stepping_doubts, result),
+    }
+
+
+def acceleration_violation(result: Result) -> float:
+    """Return the largest |G vdot - gamma| at recorded times, relative to its terms."""
+    return result.record.violation
+
+
+def energy_drift(result: Result) -> float:
+    """Return the largest deviation from the energy balance [J] at recorded times; nan if there are fewer than two."""
+    return float(np.abs(result.budget.balance).max()) if len(result.t) > 1 else float("nan")
+
+
 def motion_warnings(result: Result) -> tuple[str, ...]:
     """Return reasons to check a result, each with a remedy; none for a sound result."""
-    _ = result.vdot  # solving for accelerations adds to the remarks
     texts = [
         *result.health.remarks,
-        *doubt_messages(result),
+        *result.health.doubtful,
         _acceleration_warning(result),
         *_undetermined_load_warnings(result),
         *_undetermined_force_warnings(result),
@@ -324,8 +340,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
 
 def doubt_messages(result: Result) -> tuple[str, ...]:
     """Return reasons why a motion may not satisfy its tolerance; none for a sound motion."""
-    ledger = total_budget(result)
-    balance = _balance_warning(ledger) or lag_warning(ledger)
+    balance = _balance_warning(result.budget) or lag_warning(result.budget)
     return tuple(
         text
         for text in (
@@ -361,7 +376,7 @@ def _lifting_energy(result: Result) -> float:
     """The energy [J] that lifts all bodies by the size of the smallest body in contact, independent of the origin."""
     if result.health.contact is None:
         return 0.0
-    mass = float(sum(total_budget(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
+    mass = float(sum(result.budget.mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
     return mass * float(np.linalg.norm(result.values.system.gravity)) * result.health.contact.size
 
 
@@ -390,16 +405,14 @@ def energy_moved(result: Result) -> float:
 
     It is the sum of the largest kinetic energy and of the ranges of the gravity and spring energies and of every work.
     """
-    return float(total_budget(result).moved(0, len(result.t)))
+    return result.budget.moved(0, len(result.record.rows))
 
 
 def _balance_warning(x: EnergyBudget) -> str:
     """Return the warning for the whole mechanism, or else for the unconnected part with the worst balance."""
     found, result = _worst_imbalance(x), x.result
     if not found and result.health.options.get("rtol") is not None:
-        found = max(
-            (_worst_imbalance(x) for piece in result.pieces or (result,) for x in budgets_by_part(piece)), default=()
-        )
+        found = max((_worst_imbalance(x) for x in budgets_by_part(result)), default=())
     return found[1] if found else ""
 
 
@@ -408,7 +421,7 @@ def _worst_imbalance(x: EnergyBudget) -> tuple[float, str] | tuple[()]:
 
     A connected part is judged by its own energy.
     """
-    rows, t = len(x.result.t), x.result.t
+    rows, t = len(x.t), x.t
     if all(lost <= allowed for _, _, lost, _, allowed in _imbalances(x, rows, np.zeros(rows), 0.0)):
         return ()  # energies between the rows, and rounding, only increase the accepted imbalance
     for begin, end, lost, there, allowed in _imbalances(x, rows, _kinetic_between_outputs(x), _rest_energy(x)):
@@ -455,8 +468,8 @@ def _suspect_intervals(
 def _imbalance_text(x: EnergyBudget, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
     finer = "shorter step" if x.result.health.options.get("step") else "smaller rtol"
     return lost / allowed if allowed > 0.0 else np.inf, (
-        f"the energy balance{x.of} is off by {lost:.3g} J{when} where {moved:.3g} J were moved and {allowed:.1g} J "
-        f"are to be expected; a {finer} may tell whether the motion can be trusted"
+        f"the energy balance{x.of} is off by {lost:.3g} J{when} of {moved:.3g} J moved; {allowed:.1g} J are expected. "
+        f"Compare with a motion with a {finer}"
     )
 
 
@@ -481,12 +494,13 @@ def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
     It is estimated from the accelerations over a step, if there are more steps than rows and the estimate is much
     larger.
     """
-    r = x.result
-    none = np.zeros_like(x.kinetic)
-    if not len(r.t) or r.health.steps <= len(r.t) or r.health.options.get("step"):
+    r, none = x.result, np.zeros_like(x.kinetic)
+    gain = r.record.figures.gain[:, x.bodies].sum(axis=1)
+    known = np.isfinite(gain)
+    if not known.any() or r.health.steps <= len(r.t) or r.health.options.get("step"):
         return none
-    found = kinetic_energy_gain(r, x.bodies.tolist(), float(np.ptp(r.t)) / r.health.steps)
-    return found if SEEN_PART * found.max(initial=0.0) > x.moved(0, len(r.t)) else none
+    found = (float(np.ptp(r.t)) / r.health.steps) ** 2 * np.interp(x.t, x.t[known], gain[known])
+    return found if SEEN_PART * found.max() > x.moved(0, len(x.t)) else none
 
 
 def _rest_energy(x: EnergyBudget) -> float:
@@ -498,20 +512,20 @@ def _rest_energy(x: EnergyBudget) -> float:
     If work is done, possibly between two rows, the energy that moves all bodies through their travel in the available
     time is added.
     """
-    length, t = x.result.values.length, x.result.t
+    length, t = x.result.values.length, x.t
     rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
     least = rounding + float(x.mass.sum()) * (REST_SPEED * length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0
     if not x.works or not span > 0.0:
         return least
-    return least + expected_imbalance(x.result) * float(x.mass @ x.squared_travel) / max(span, 1e-150) ** 2
+    return least + expected_imbalance(x.result) * float(x.mass @ x.travel**2) / max(span, 1e-150) ** 2
 
 
 def _violation_warning(result: Result) -> str:
     worst, length = result.health.violation, result.values.length
     if not worst > MAX_VIOLATION * length:
         return ""
-    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' keeps them"
+    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' satisfies them"
 
 
 def _acceleration_warning(result: Result) -> str:
@@ -519,23 +533,25 @@ def _acceleration_warning(result: Result) -> str:
     if not worst > MAX_ACCELERATION_VIOLATION:
         return ""
     return (
-        f"accelerations miss the constraints by a part of {worst:.1e}: a position is all but singular, or masses "
-        f"differ too much. Reactions may miss by thousands of times that part; equilibrium() has those at rest"
+        f"accelerations violate the constraints by {worst:.1e} of their terms: a position is nearly singular, or "
+        "masses differ too much. The relative error of reactions may be a thousand times larger; for a mechanism at "
+        "rest equilibrium() computes them accurately"
     )
 
 
 def _undetermined_load_warnings(result: Result) -> list[str]:
     return [
         f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
-        f"({', '.join(what)}): its load is one choice of many. Replace a joint by one that holds less, as Spherical"
+        f"({', '.join(what)}): its load is not unique. Replace a joint by one with fewer constraints, such as "
+        "Spherical"
         for f, what in undetermined_loads(_frictions_with_load(result), result.health.undetermined)
     ]
 
 
 def _undetermined_force_warnings(result: Result) -> list[str]:
     return [
-        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is one "
-        f"choice of many. Replace a joint by one that holds less, as Spherical"
+        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is not "
+        "unique. Replace a joint by one with fewer constraints, such as Spherical"
         for name, what in undetermined_event_forces(result.model, result.health.undetermined)
     ]
 
@@ -550,7 +566,7 @@ def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str
         Joint -> components, as of `Mobility`.
     """
     found = []
-    for name, x in forces_in_events(model).items():
+    for name, x in forces_in_events(model).items() if undetermined else ():
         kind = "force" if name.partition(".")[2].startswith("f") else "torque"
         found.append((name, tuple(k for k in undetermined.get(x.element.name, ()) if k.startswith(kind))))
     return [(name, what) for name, what in found if what]
@@ -575,7 +591,7 @@ def _creep_warnings(result: Result) -> list[str]:
     limit = MIN_CREEP * result.values.length
     return [
         f"{result.model[name].title} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a "
-        f"smaller stick_speed makes it less"
+        "smaller stick_speed reduces it"
         for name, (speed, distance) in result.health.creep.items()
         if distance > limit
     ]

@@ -22,7 +22,7 @@ from ..model.quantities import ENERGY, Quantity, quantities
 from ..numerics.graphs import find_root, unite
 from ..tables.table_definitions import BETWEEN, SLIDING, System
 from .part_views.base import NamedQuantities
-from .phases import EVENT_WORK, stored_reference
+from .phases import EVENT_WORK, stored_by_events, stored_reference
 
 if TYPE_CHECKING:
     from .result import Result
@@ -40,16 +40,6 @@ CONTACT_ELASTIC = "contact_elastic"
 def kinetic_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
     """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
     _, R, w, v, _, _ = result.motions.bodies(bodies)
-    return _kinetic_energy_of(result, bodies, R, w, v)
-
-
-def kinetic_energy_gain(result: Result, bodies: Sequence[int] | np.ndarray, time: float) -> np.ndarray:
-    """Kinetic energy [J] that the accelerations at every output time give bodies at rest in a time [s]."""
-    _, R, _, _, alpha, a = result.records.bodies(bodies)
-    return time**2 * _kinetic_energy_of(result, bodies, R, alpha, a)
-
-
-def _kinetic_energy_of(result: Result, bodies: Sequence[int] | np.ndarray, R: tuple, w: tuple, v: tuple) -> np.ndarray:
     table = result.values.system.bodies
     w_B, inertia = mtv(R, w), tuple(table.inertia[bodies].T[..., None])
     return (0.5 * table.mass[bodies, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
@@ -171,7 +161,7 @@ class Energy(NamedQuantities):
 
 @dataclass(frozen=True)
 class EnergyBudget:
-    """Energies [J] of some bodies at every output time.
+    """Energies [J] of some bodies at every recorded time.
 
     Attributes
     ----------
@@ -196,6 +186,11 @@ class EnergyBudget:
     foreign: np.ndarray
 
     @property
+    def t(self) -> np.ndarray:
+        """The recorded times [s]."""
+        return self.result.t[self.result.record.rows]
+
+    @property
     def mass(self) -> np.ndarray:
         """Of each of the bodies [kg]."""
         return self.result.values.system.bodies.mass[self.bodies]
@@ -206,11 +201,10 @@ class EnergyBudget:
         return float(self.mass.sum() * np.linalg.norm(self.result.values.system.gravity))
 
     @property
-    def squared_travel(self) -> np.ndarray:
-        """Square of the approximate travel of each body [m^2]."""
-        r = self.result.motions
-        x, y, z = (np.ptp(p, axis=1) for p in r.bodies(self.bodies)[0])
-        return x**2 + y**2 + z**2
+    def travel(self) -> np.ndarray:
+        """Approximate travel of each body [m]."""
+        p = self.result.record.figures.position[:, self.bodies]
+        return np.sqrt(((p.max(axis=0) - p.min(axis=0)) ** 2).sum(axis=1))
 
     def known(self, begin: int, end: int) -> bool:
         """Return whether the balance is valid from row ``begin`` to the one before ``end``."""
@@ -235,16 +229,43 @@ class EnergyBudget:
         """
         if end <= begin:
             return 0.0
-        ranges = sum(np.ptp(x[begin:end]) for x in (*self.stored, *self.works))
-        return float(self.kinetic[begin:end].max() + ranges)
+        every = np.stack([*self.stored, *self.works])[:, begin:end]
+        return float(self.kinetic[begin:end].max() + (every.max(axis=1) - every.min(axis=1)).sum())
 
 
 def total_budget(result: Result) -> EnergyBudget:
-    """Return the budget of all bodies."""
-    e = result.energy
+    """Return the budget of all bodies at the recorded times."""
+    rows, figures, e = result.record.rows, result.record.figures, result.energy
+    bodies = e._bodies
+    kinetic, gravity = figures.kinetic[:, bodies].sum(axis=1), figures.gravity[:, bodies].sum(axis=1)
+    for b in result.bulk.values():
+        kinetic, gravity = kinetic + b.kinetic[rows], gravity + b.potential(result.values.system.gravity)[rows]
+    elastic = figures.elastic.sum(axis=1)
+    works = _recorded_works(result)
+    residue = kinetic + gravity + elastic - sum(works.values(), np.zeros(len(rows)))
+    for name, x in result.exchanged.items():
+        if name == CONTACT_ELASTIC:
+            elastic = elastic + x[rows]
+        residue -= {CONTACT_ELASTIC: -1.0, EVENT_WORK: 1.0, **EXCHANGE_SIGNS}[name] * x[rows]
     every = np.arange(len(result.values.system.tree.parent))
-    none = result.motions.zeros()
-    return EnergyBudget(result, every, e.kinetic, e.balance, (e.gravity, e.elastic), tuple(e.work.values()), none)
+    stored = gravity, elastic
+    return EnergyBudget(
+        result, every, kinetic, residue - residue[:1], stored, tuple(works.values()), np.zeros(len(rows))
+    )
+
+
+def _recorded_works(result: Result) -> dict[str, np.ndarray]:
+    """Return `Energy.work` at the recorded times, but for constants."""
+    s, (rows, figures) = result.values.structure, (result.record.rows, result.record.figures)
+    index = {f.name: k for k, f in enumerate(s.forces) if f.energy is not None}
+    out = {}
+    for state, at in s.state_at.items():
+        name = state.removesuffix(".work")
+        if name != state:
+            out[name] = result.states[rows, at]
+            if name in index:
+                out[name] = out[name] + figures.elastic[:, index[name]] - stored_by_events(result, name)[rows]
+    return out
 
 
 def budgets_by_part(result: Result) -> list[EnergyBudget]:
@@ -252,29 +273,25 @@ def budgets_by_part(result: Result) -> list[EnergyBudget]:
 
     Energies exchanged by impacts and events are not known by parts.
     """
-    S = result.values.system
-    part = result.values.structure.kept.get("connected", None, 1, partial(connected_parts, S))
+    s, S = result.values.structure, result.values.system
+    part = s.kept.get("connected", None, 1, partial(connected_parts, S))
     many = int(part.max(initial=0)) + 1
     if many < 2 or result.bulk or not len(result.t):
         return []
-    of = [np.flatnonzero(part == p) for p in range(many)]
-    elastic = [result.motions.zeros() for _ in of]
-    works: list[list[np.ndarray]] = [[] for _ in of]
-    for f in result.model.acting():
-        at = _part_of(result, f, part)
-        if at >= 0:
-            elastic[at] = elastic[at] + result[f.name].energy
-    for name, work in result.energy.work.items():
-        at = _part_of(result, result[name].element, part)
-        if at >= 0:
-            works[at].append(work)
-    out, foreign = [], _exchanged_by_events(result)
-    for p, bodies in enumerate(of):
-        moving, weight = kinetic_energy(result, bodies), gravity_energy(result, bodies)
-        residue = moving + weight + elastic[p] - sum(works[p], result.motions.zeros())
-        out.append(
-            EnergyBudget(result, bodies, moving, residue - residue[0], (weight, elastic[p]), tuple(works[p]), foreign)
-        )
+    rows, figures = result.record.rows, result.record.figures
+    of_force = [_part_of(result, f, part) for f in s.forces]
+    works = [(_part_of(result, s.model[name], part), work) for name, work in _recorded_works(result).items()]
+    foreign = sum((np.abs(x) for k, x in result.exchanged.items() if k != CONTACT_ELASTIC), np.zeros(len(result.t)))[
+        rows
+    ]
+    out = []
+    for p in range(many):
+        bodies = np.flatnonzero(part == p)
+        moving, weight = figures.kinetic[:, bodies].sum(axis=1), figures.gravity[:, bodies].sum(axis=1)
+        elastic = figures.elastic[:, [k for k, at in enumerate(of_force) if at == p]].sum(axis=1)
+        own = tuple(work for at, work in works if at == p)
+        residue = moving + weight + elastic - sum(own, np.zeros(len(rows)))
+        out.append(EnergyBudget(result, bodies, moving, residue - residue[0], (weight, elastic), own, foreign))
     return out
 
 
@@ -324,12 +341,6 @@ def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
     return int(part[bodies[0]]) if len(bodies) else -1
 
 
-def _exchanged_by_events(result: Result) -> np.ndarray:
-    """Return the energy that impacts, contacts and events took or gave since the start, (n,) [J]."""
-    e = result.energy
-    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGE_SIGNS, EVENT_WORK)), result.motions.zeros())
-
-
 MAX_LAG = 0.05  # position error relative to a body's travel
 NEGLIGIBLE_TRAVEL = 1e-6  # relative to the mechanism's length: smaller travel is ignored
 TURNING_POINT = 0.1  # relative to the largest kinetic energy: below it an oscillating motion is at a turning point
@@ -338,40 +349,38 @@ TURNING_POINT = 0.1  # relative to the largest kinetic energy: below it an oscil
 def lag_warning(x: EnergyBudget) -> str:
     """A warning on the phase error of a motion with one degree of freedom, from its energy error; nothing if small.
 
-    It is not evaluated if there are more steps than output times, which may then miss slow phases.
+    It is not evaluated if there are more steps than recorded times, which may then miss slow phases.
     """
     r = x.result
     unknown = x.works or r.exchanged or r.bulk or r.pieces
-    if unknown or not 1 < r.health.steps <= len(r.t) or not x.kinetic.max() > 0.0:
+    if unknown or not 1 < r.health.steps <= len(x.t) or not x.kinetic.max() > 0.0:
         return ""
     faster = _speed_excess(x)
     faster[_turning_points(x)] = 0.0
-    lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(r.t))]
-    off, name, way = 0.0, "", NEGLIGIBLE_TRAVEL * r.values.length
-    for body, b in r.values.structure.place.items():
-        if b < 0:
-            continue
-        p, _, _, v, _, _ = r.motions.body(b)
-        way = max(way, float(np.linalg.norm(np.ptp(p, axis=1))))
-        off, name = max((off, name), (float((np.abs(lag) * np.linalg.norm(v, axis=0)).max()), body))
-    if not off > MAX_LAG * way or r.health.freedoms != 1:
+    lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(x.t))]
+    names = {b: name for name, b in r.values.structure.place.items() if b >= 0}
+    bodies = list(names)
+    by = (np.abs(lag)[:, None] * r.record.figures.speed[:, bodies]).max(axis=0)
+    way = max(float(x.travel[bodies].max(initial=0.0)), NEGLIGIBLE_TRAVEL * r.values.length)
+    if not by.max(initial=0.0) > MAX_LAG * way or r.health.freedoms != 1:
         return ""
+    off, name = float(by.max()), names[bodies[int(np.argmax(by))]]
     finer = "shorter step" if r.health.options.get("step") else "smaller rtol"
     return (
-        f"the energy is off by up to {np.abs(x.balance).max():.2g} J where down to {x.kinetic.min():.2g} J move: by "
-        f"that alone the motion comes to be {np.abs(lag).max():.2g} s early or late, and {name!r} off by about "
-        f"{off:.2g} m; a {finer} may tell whether it can be trusted"
+        f"the energy is off by up to {np.abs(x.balance).max():.2g} J, and the kinetic energy falls to "
+        f"{x.kinetic.min():.2g} J: this error alone makes the motion {np.abs(lag).max():.2g} s early or late, and the "
+        f"position of {name!r} wrong by about {off:.2g} m. Compare with a motion with a {finer}"
     )
 
 
 def _speed_excess(x: EnergyBudget) -> np.ndarray:
-    """Return the relative speed error at every output time, dE / 2T, limited to 1/2."""
+    """Return the relative speed error at every recorded time, dE / 2T, limited to 1/2."""
     return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
 
 
 def _turning_points(x: EnergyBudget) -> np.ndarray:
     """Return rows around turning points: the speed error is large there, the time error is not."""
-    slow, v = x.kinetic < TURNING_POINT * x.kinetic.max(), x.result.v
+    slow, v = x.kinetic < TURNING_POINT * x.kinetic.max(), x.result.v[x.result.record.rows]
     edges = np.flatnonzero(np.diff(np.r_[False, slow, False]))
     out = np.zeros(len(slow), bool)
     for begin, end in edges.reshape(-1, 2):

@@ -48,7 +48,7 @@ class Touch:
     gap: float = 0.0
 
     def __str__(self) -> str:
-        part = f"{100.0 * self.used:.3g} % of what it bears"
+        part = f"{100.0 * self.used:.3g} % of its largest force"
         friction = f", friction {self.tangential:.4g} N, {part}" if self.used else ""
         return f"{self.name} {self.state}, presses with {self.normal:.4g}{friction}"
 
@@ -134,7 +134,7 @@ class Equilibrium:
         out += [("position", text) for text in self._positions()]
         if self.weakest:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
-            what = "least stiffness" + (" with controllers' states held" if self.judged_by else "")
+            what = "least stiffness" + (" with constant controllers' states" if self.judged_by else "")
             out.append((what, f"{self.least:.3g} of what acts, along {parts}"))
         out += [("kink", text) for text in self.kinks]
         out += [("contact", str(k)) for k in self.touching[:MAX_CONTACTS]]

@@ -79,7 +79,7 @@ class EquilibriumSeries:
         head = " ".join(f"{n:>16}" for n in names)
         sizes = {n: max((abs(e[n]) for e in self.equilibria), default=0.0) for n in names}
         held = any(e.judged_by for e in self.equilibria)
-        what = "held stiffness" if held else "least stiffness"
+        what = "stiffness with constant controllers" if held else "least stiffness"
         out = [(self.parameter, f"{'stability':<9} {what:>16} {head}")]
         for value, e in zip(self.values, self.equilibria, strict=True):
             parts = " ".join(f"{number_text(e[n], sizes[n], 8):>16}" for n in names)

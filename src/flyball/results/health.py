@@ -91,8 +91,9 @@ class ContactHealth:
         out = []
         if self.endless:
             out.append(
-                f"in {self.endless} of {self.solves} steps the sequence of impacts did not end, and the last were "
-                f"taken as inelastic: take shorter steps, method=fb.Stepping(step=...), with fewer impacts in each"
+                f"in {self.endless} of {self.solves} steps the sequence of impacts did not end, and the last impacts "
+                "were computed as inelastic: take shorter steps, method=fb.Stepping(step=...), with fewer impacts in "
+                "each"
             )
         if self.size > 0.0 and self.worst_overlap > max(PASSED_THROUGH * self.size, 1.01 * self.overlap_at_start):
             out.append(
@@ -106,27 +107,28 @@ class ContactHealth:
         """Return reasons to check the motion."""
         out = list(self.notes)
         if self.halved:
-            out.append(
-                f"{self.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps"
-            )
+            out.append(f"{self.halved} steps were divided, since joints could not be closed: give shorter steps")
         if self.reduced:
             law = self.impacts.partition(",")[0]
             out.append(
-                f"{self.reduced} of {self.impacted} impacts gave back less than {law}'s law says, which would have "
-                f"made energy there"
+                f"{self.reduced} of {self.impacted} impacts rebound less than {law}'s law prescribes, since that "
+                "rebound would have added energy"
             )
         if self.unconverged:
             when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""
-            share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"
+            share = f"{self.unconverged} of {self.solves} contact solves were stopped before convergence{when}"
             out.append(
-                f"{share}: forces are rough there; take shorter steps, or allow more by "
-                f"method=fb.Stepping(iterations=...)"
+                f"{share}: their forces are inaccurate; take shorter steps, or allow more iterations by "
+                "method=fb.Stepping(iterations=...)"
             )
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
             part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"
             out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")
         if self.size > 0.0 and self.overlap_at_start > 1e-3 * self.size:
-            out.append(f"bodies overlap by {self.overlap_at_start:.2g} m as described; they are pushed apart at first")
+            out.append(
+                f"bodies overlap by {self.overlap_at_start:.2g} m in the reference configuration; they are pushed "
+                "apart at the start"
+            )
         return tuple(out)
 
     def as_dict(self) -> dict[str, Any]:
@@ -222,14 +224,13 @@ def velocity_not_allowed(d: InitialDeviation) -> str:
     """Return the message on an unsatisfied, or unexpected, initial velocity, with remedies."""
     if not d.given:
         return (
-            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the "
-            f"constraints need it to keep "
-            f"given velocities as nearly as they can. Check those, and whether the position is near a dead centre, or "
-            f"give {d.element!r} a velocity too"
+            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the constraints need "
+            "it for velocities as near as possible to the given ones. Check those, and whether the position is near "
+            f"a dead centre, or give {d.element!r} a velocity too"
         )
     return (
-        f"{d.text}: joints, drivers or other given velocities do not allow it; the nearest was taken. Correct it, or "
-        f"leave it out: what is not given is free"
+        f"{d.text}: joints, drivers or other given velocities do not allow it; the nearest possible velocity is used. "
+        "Correct it, or leave it out: velocities that are not given are free"
     )
 
 
@@ -239,7 +240,7 @@ def deviation_summary(deviations: Sequence[InitialDeviation]) -> str:
     for d in deviations:
         if d.what not in VELOCITY_FIELDS and (d.element not in moved or d.what == "position"):
             moved[d.element] = d
-    text = "closed as drawn"
+    text = "closed in the reference configuration"
     if moved:
         count = f"{len(moved)} {'body' if len(moved) == 1 else 'bodies'}"
         worst = max(moved.values(), key=lambda d: (d.what == "position", d.distance))
@@ -346,7 +347,7 @@ class Health:
     def balance(self) -> str:
         """Description of the accuracy of the energy balance."""
         if math.isnan(self.energy_drift):
-            return "not measured: it compares the energy at output times, and there are fewer than two"
+            return "not measured: fewer than two output times"
         return f"{self.energy_drift:.2e} J largest deviation"
 
     @property
@@ -391,7 +392,7 @@ class Health:
             *([("engine", self.engine)] if self.engine else []),
             *([("assembly", deviation_summary(self.departures))] if self.departures else []),
             ("freedoms", str(self.freedoms) + (f", and those of {self.crowd} bodies in sets" if self.crowd else "")),
-            ("steps", f"{self.steps} accepted, {self.rejected} refused"),
+            ("steps", f"{self.steps} accepted, {self.rejected} rejected"),
             ("energy balance", self.balance),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
             ("time used", f"{self.seconds:.2f} s{self._compiled}"),
@@ -420,5 +421,6 @@ class Health:
         return out + [(f"warning {k}", text) for k, text in enumerate(others, 1)]
 
     def __str__(self) -> str:
-        width = max(len(k) for k, _ in self.lines())
-        return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
+        lines = self.lines()
+        width = max(len(k) for k, _ in lines)
+        return "\n".join(f"{k:<{width}}  {v}" for k, v in lines)

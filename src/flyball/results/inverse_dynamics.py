@@ -214,7 +214,10 @@ class InverseDynamics:
             out.append(
                 (
                     "warning",
-                    f"singular position at or beside t = {at} s: forces there grow without bound, or are rounding",
+                    (
+                        f"singular position at or near t = {at} s: forces grow without bound there, or are rounding "
+                        "errors"
+                    ),
                 )
             )
         return out

@@ -173,8 +173,8 @@ class Descriptor:
             raise ModelError(f"near must be a finite number, got {near!r}")
         if not self.on_positions.all() or self.kinematic.nnz or self.turning.nnz:
             raise ModelError(
-                "few eigenvalues of the descriptor form are found at rest, of constraints on positions; ask for all of "
-                "them: eigenvalues"
+                "few eigenvalues of the descriptor form are found at rest, and for constraints on positions only; "
+                "compute all of them: eigenvalues"
             )
         S = sp.diags(self.scale)
         G = self.constraints @ S

@@ -221,14 +221,17 @@ class RedundantSet:
     def advice(self) -> str:
         """What to do about it."""
         if self.cure is not None:
-            return f"cure: {self.cure.text}"
+            return f"remedy: {self.cure.text}"
         if self.contradiction and self.drivers:
-            return f"cure: leave out one of {', '.join(self.drivers)}, or make their laws agree with the rest"
+            return (
+                f"remedy: leave out one of {', '.join(self.drivers)}, or make their laws compatible with the other "
+                "constraints"
+            )
         if self.here_only:
-            return "cure: another position or other dimensions; it is no joint's fault"
+            return "remedy: another position or other dimensions; another joint does not help"
         if self.contradiction:
-            return "cure: correct the lengths, the points or the laws of these, so that all can be fulfilled"
-        return f"no cure by another joint was found{self.cut and f'; the search was cut {self.cut}'}"
+            return "remedy: correct their lengths, points or laws so that all can be satisfied"
+        return f"no remedy by another joint was found{self.cut and f'; the search was cut {self.cut}'}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""

@@ -188,9 +188,15 @@ def stored_reference(result: Any, name: str) -> np.ndarray:
         return np.full(len(result.t), _stored_by_events(whole, name)[at] + _stored_at_start(whole, name))
     known = whole.__dict__.setdefault("_basis", {})
     if name not in known:
-        jumped = _at_output_times(whole, _stored_by_events(whole, name)) if whole.phases is not None else 0.0
-        known[name] = jumped + _stored_at_start(whole, name) + np.zeros(len(whole.t))
+        known[name] = stored_by_events(whole, name) + _stored_at_start(whole, name)
     return known[name][at]
+
+
+def stored_by_events(result: Any, name: str) -> np.ndarray:
+    """Return the energy [J] that events have stored in a force since the start, (n,)."""
+    if result.phases is None:
+        return np.zeros(len(result.t))
+    return _at_output_times(result, _stored_by_events(result, name))
 
 
 def event_energies_in_phase(result: Any, k: int) -> dict[str, np.ndarray]:
@@ -355,7 +361,7 @@ class Moment:
         if not np.isfinite(value).all():
             raise ModelError(
                 f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "
-                f"constraints jump there; read positions, velocities and energies, or what is at output times"
+                "constraints jump there; read positions, velocities and energies, or values at output times"
             )
         return float(value) if np.ndim(value) == 0 else value
 

@@ -18,9 +18,10 @@ from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
 from .body_sets import SET_MOTION_ARRAYS, BodySetMotion
 from .contacts import Contacts, concatenate_contacts
-from .energy_balance import CONTACT_ELASTIC, Energy
+from .energy_balance import CONTACT_ELASTIC, Energy, EnergyBudget, total_budget
 from .events import EventRecord, Events, with_moments
 from .health import ContactHealth, Health
+from .motion_record import MotionRecord, record_motion
 from .part_views import has_view, view_of
 from .part_views.base import Curves, SplicedView
 from .part_views.bodies import BodySetView, SetMemberView
@@ -202,6 +203,16 @@ class Result:
         return RecordedMotion(self.values, self.q, self.v, None, self.wound)
 
     @cached_property
+    def record(self) -> MotionRecord:
+        """Energies and errors at recorded times, by which the result judges itself."""
+        return record_motion(self)
+
+    @cached_property
+    def budget(self) -> EnergyBudget:
+        """Energy budget of all bodies at recorded times."""
+        return total_budget(self)
+
+    @cached_property
     def measured(self) -> MeasuredQuantities:
         """Quantities along which forces act and which laws use."""
         return MeasuredQuantities(self)
@@ -314,7 +325,7 @@ class Result:
         """
         own, other = self.values.structure, compiled.structure
         if list(own.place) != list(other.place) or own.states != other.states or list(own.slices) != list(other.slices):
-            raise ModelError(f"the result of {self.model.name!r} cannot be gone on with: the mechanism is another one")
+            raise ModelError(f"the result of {self.model.name!r} cannot be continued: the mechanism is a different one")
         return self.final[1].copy()
 
     def lines(self) -> list[tuple[str, str]]:

@@ -55,7 +55,7 @@ def read_result(path: str | os.PathLike, cls: type[ModelType]) -> Result:
         raise _damaged_file_error(where, f"{type(error).__name__}: {error}") from None
     if kind < 3:
         late: dict[str, Any] = result.health.late
-        note = f"{path.name} was written before result files had checksums: whether it is damaged cannot be told"
+        note = f"{path.name} was written before result files had checksums: damage cannot be detected"
         late["warnings"] = (*result.health.warnings, note)
     return result
 
@@ -74,7 +74,7 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
 
     try:
         if is_sealed(path) is False:
-            raise _damaged_file_error(os.fspath(path), "what it holds does not fit the checksum at its end")
+            raise _damaged_file_error(os.fspath(path), "its contents do not match the checksum at its end")
         with h5py.File(path, "r") as whole:
             dict(whole.attrs)  # h5netcdf leaves a file open if this fails
             file = h5netcdf.File(whole, "r")
@@ -82,7 +82,7 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
                 raise ModelError(f"{path} is a study, no result: read it with flyball.load_study")
             if OWN_GROUP not in file.groups:
                 raise ModelError(
-                    f"{path} is no result of flyball (it holds no group {OWN_GROUP!r}); {RESULT_FILE_REMEDY}"
+                    f"{path} is no result of flyball (it has no group {OWN_GROUP!r}); {RESULT_FILE_REMEDY}"
                 )
             group = file.groups[OWN_GROUP]
             kind, written = int(group.attrs["format"]), group.attrs.get("checksum")
@@ -98,7 +98,7 @@ def _read_stored(path: Path) -> tuple[dict[str, Any], int]:
     if written is None and kind >= 3:
         raise _damaged_file_error(os.fspath(path), "its checksum is missing")
     if written is not None and written != data_checksum(stored, kind):
-        raise _damaged_file_error(os.fspath(path), "what it holds does not fit its checksum")
+        raise _damaged_file_error(os.fspath(path), "its contents do not match its checksum")
     if kind < 3 and "model" in stored:
         stored["model"] = _updated_model_text(stored["model"])
     return stored, kind

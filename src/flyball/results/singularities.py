@@ -117,11 +117,11 @@ class Singularity:
         """Return labels and texts of the summary."""
         counts = [self.count(rate=1.0), self.count(acceleration=1.0), self.count(acceleration=-1.0)]
         told = ", ".join(f"{n:g} for {w}" for n, w in zip(counts, ("a' = 1", "a'' = 1", "a'' = -1"), strict=True))
-        more = "; self-motion with the driver held" if self.self_motion and self.kind != SELF_MOTION else ""
-        more += "; nothing leads away from here" if self.isolated else ""
+        more = "; self-motion while the driver is at rest" if self.self_motion and self.kind != SELF_MOTION else ""
+        more += "; no branch leads away from here" if self.isolated else ""
         yield f"a = {coordinate_text(self.a, unit)}", f"{self.kind}{more}; motions: {told}"
         for n in self.null_vectors:
-            yield "", f"free with the driver held: {vector_text(n)}"
+            yield "", f"free while the driver is at rest: {vector_text(n)}"
         for u in self.left_null_vectors:
             yield "", f"dependent rows: {vector_text(u)}"
         for k, b in enumerate(self.branches):
@@ -133,7 +133,10 @@ class Singularity:
         if self.endless:
             yield "", "infinitely many directions lead away: more freedoms meet here"
         elif not self.decided:
-            yield "", "derivatives of second order leave branches open: those above were found at small distances"
+            yield (
+                "",
+                "second derivatives do not determine the branches: those above were found at small distances",
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""

@@ -151,7 +151,7 @@ def _estimate_indices(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 STUDY_FORMAT = 1
 RUN_DIMENSION, TIME_DIMENSION = "run", "time"
-DOUBTFUL_ATTRIBUTES = {"comment": "1: done, but perhaps not what its tolerance asks for"}
+DOUBTFUL_ATTRIBUTES = {"comment": "1: done, but its tolerance may not be met"}
 TEXTS_BY_RUN = ("reasons", "remarks", "doubtful")
 """Texts by the number of the run."""
 STORED_FIELDS = (
@@ -246,7 +246,7 @@ NOT_RUN, DONE, FAILED = 0, 1, 2
 STATUS_TEXTS, DOUBTFUL_TEXT = ("still to be done", "done", "failed"), "done, but doubtful"
 TIME_OPTIONS = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option with its output times
 MAX_TEXTS = 6  # number of reasons in a text
-NOT_SALTELLI = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
+NOT_SALTELLI = "sensitivity indices need design='saltelli'; this is a study of design={!r}"
 
 
 @dataclass(repr=False)
@@ -412,7 +412,7 @@ class Study:
             raise ModelError(NOT_SALTELLI.format(self.design))
         names = of or tuple(name for name in self.of if self.values[name].ndim == 1)
         if curves := [name for name in names if self[name].ndim > 1]:
-            raise ModelError(f"{curves[0]} is a curve; ask for end({curves[0]}), or max, min, mean, rms of it")
+            raise ModelError(f"{curves[0]} is a curve; give end({curves[0]}), or max, min, mean, rms of it")
         d = len(self.parameters)
         y = np.array([self.values[name] for name in names]).reshape(len(names), d + 2, -1)
         return Indices.of_runs(names, self.parameters, y)
@@ -592,7 +592,7 @@ def load_study_file(path: str | os.PathLike, mark: str | None = None) -> Study:
     except OSError as error:
         raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror or error}") from None
     if not whole:
-        what = "is damaged: what it holds does not fit the checksum at its end" if whole is False else "is no study"
+        what = "is damaged: its contents do not match the checksum at its end" if whole is False else "is no study"
         raise ModelError(f"{path} {what}; {STUDY_FILE_REMEDY}")
     found = _read_study(path)
     if mark is not None and found.mark != mark:

@@ -187,6 +187,7 @@ def _group_derivatives(
                 continue
             raise SingularityError(
                 f"the eigenvalue {value.real:.4g}{value.imag:+.4g}j 1/s is {len(group)}-fold and has fewer "
-                f"eigenvectors: it has no derivative by {name!r}. Ask a little to the side of this value"
+                f"eigenvectors: it has no derivative with respect to {name!r}. Choose a value slightly different from "
+                "this one"
             )
     return out

@@ -56,7 +56,7 @@ class OptimizeOptions(DerivativeOptions):
         if (self.target is None) == (self.minimize is None):
             raise ModelError("give either a target or a function to minimize")
         if self.minimize is not None and not (np.ndim(self.weights) == 0 and self.weights == 1.0):
-            raise ModelError("weights are of the differences from a target; with minimize they do nothing")
+            raise ModelError("weights apply to the differences from a target; with minimize they have no effect")
         at_least(self.evaluations, "evaluations")
         require_positive(self.tolerance, "tolerance")
 
@@ -79,7 +79,7 @@ class OptimizeOptions(DerivativeOptions):
 
 
 ZERO_SLOPE_MESSAGE = (
-    "every derivative is zero where it begins, at the best place or at any other: begin elsewhere to be sure"
+    "every derivative is zero at the start, which may be a minimum or not: start from other values to check"
 )
 LIMIT_MESSAGE = "as many analyses as evaluations= allows"
 FIT_MESSAGES = {  # by the status of SciPy's least_squares
@@ -92,7 +92,10 @@ FIT_MESSAGES = {  # by the status of SciPy's least_squares
 SEARCH_MESSAGES = {  # by the status of L-BFGS-B
     0: "no change of the parameters makes it less by more than the tolerance",
     1: LIMIT_MESSAGE,
-    2: "nothing along the slope is less: the function has a kink there, or rounding is as large as the tolerance",
+    2: (
+        "no smaller value was found along the slope: the function has a kink there, or rounding is as large as the "
+        "tolerance"
+    ),
 }
 
 
@@ -142,7 +145,7 @@ class ParameterSearch:
         if len(wrong):
             i = wrong[0]
             raise ModelError(
-                f"parameter {self.names[i]!r} begins at {self.start[i]:g}, outside its bound {out[i] * self.scale[i]:g}"
+                f"parameter {self.names[i]!r} starts at {self.start[i]:g}, outside its bound {out[i] * self.scale[i]:g}"
             )
         return out
 

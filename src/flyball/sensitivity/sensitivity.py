@@ -88,17 +88,17 @@ class DerivativeOptions(Options):
             raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, all_)}; {listing(all_)}")
         for name in ("t_end", "outputs", "rtol", "atol"):
             if getattr(self, name) is not None and self.analysis != "motion":
-                raise ModelError(f"{name} is of a motion; with analysis={self.analysis!r} it does nothing")
+                raise ModelError(f"{name} applies to a motion; with analysis={self.analysis!r} it has no effect")
         if self.analysis == "motion" and self.t_end is None:
             raise ModelError("sensitivity of a motion: give t_end")
         refuse_unknown_coordinates(self.coordinates)
         if self.coordinates != "auto" and self.analysis != "motion":
-            raise ModelError(f"coordinates are those of a motion; with analysis={self.analysis!r} they do nothing")
+            raise ModelError(f"coordinates apply to a motion; with analysis={self.analysis!r} they have no effect")
         for name in ("rtol", "atol"):
             if getattr(self, name) is not None:
                 require_positive(getattr(self, name), name)
         if self.about is not None and self.analysis != "modes":
-            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it does nothing")
+            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it has no effect")
         if self.about not in (None, "equilibrium"):
             raise ModelError(f"about must be 'equilibrium' or nothing, got {_value_text(self.about)}")
 
@@ -119,7 +119,7 @@ class SensitivityOptions(DerivativeOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.of and self.analysis != "modes":
-            raise ModelError("say which quantities: of=['slider.x'], for instance")
+            raise ModelError("give the quantities: of=['slider.x'], for instance")
 
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
@@ -333,8 +333,8 @@ def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
     if abs(found.least) < LEAST_STIFFNESS_RATIO:
         weak = ", ".join(found.weakest)
         raise SingularityError(
-            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its place is not determined, so it "
-            f"has no derivatives; hold it there by a spring or a driver",
+            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its position is not determined, so "
+            "it has no derivatives; add a spring or a driver there",
             a.t,
             tuple(found.weakest),
         )

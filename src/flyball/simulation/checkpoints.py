@@ -15,7 +15,6 @@ import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +25,17 @@ from ..model.model import Model
 from ..progress import ReportProgress, progress_bar
 from ..results import diagnostics
 from ..results.files import save
+from ..results.motion_record import record_motion
 from ..results.result import Result, concatenate_results
 from ..results.result_loading import read_result
 from ..results.study import study_fingerprint
-from .diagnosis import acceleration_violation
 from .impulse_stepping.impulse_simulation import INTERRUPTED_MESSAGE
 from .initial_state import start_time
 from .integration_intervals import Segment
 from .integration_options import output_times
 from .method_choice import AUTO_METHOD as ANY
 from .method_choice import MethodChoice, SimulateOptions, choose_method, is_unresolved, reason_for_impulses
+from .motion_result import motion_judgements
 from .simulate import Span, simulate, simulate_with_reason
 
 
@@ -132,9 +132,9 @@ class _SegmentedMotion:
         kept = self.kept
         kept.write()
         result.health.message += (
-            f"; {kept.path} holds it to t = {kept.parts[-1].final[0]:.6g} s, from where the same call goes on"
+            f"; {kept.path} contains it to t = {kept.parts[-1].final[0]:.6g} s; the same call continues from there"
             if kept.parts
-            else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
+            else f"; no segment of it had ended, so {kept.path} contains nothing: the same call starts again"
         )
         return Interrupted(result.health.message, result)
 
@@ -243,8 +243,8 @@ class CheckpointFile:
             raise ModelError(f"{self.path} is a result, but not one that was kept with checkpoint=; {REMEDY}")
         if told["mark"] != self.mark:
             raise ModelError(
-                f"{self.path} is of another motion than this: model, values, options or the version of flyball are not "
-                f"the same. To go on from where it ended give start=fb.load_result(...); else {REMEDY}"
+                f"{self.path} is of another motion than this: model, values, options or the version of flyball are "
+                f"not the same. To continue from its end give start=fb.load_result(...); else {REMEDY}"
             )
         self._run, self._count, self.by = told["run"], told["parts"], told["by"]
         self.parts, self._first = [found], len(found.t)
@@ -320,25 +320,13 @@ class CheckpointFile:
         self._files = []
 
 
-# Parts of the health report of a segmented motion that are computed on first access.
-
-
 def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
     """Return ``result`` (the joined segments) with a health report that covers all segments."""
     if len(parts) == 1:
         return result
     health = result.health
-    health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
-    if isinstance(health.options.get("method"), Mapping):  # impulse stepping: accelerations are means
-        health.late |= {
-            "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
-            "warnings": partial(diagnostics.impulse_stepping_warnings, result),
-        }
-        return result
-    health.late |= {
-        "acceleration_violation": partial(acceleration_violation, result),
-        "creep": partial(diagnostics.friction_creep, result),
-        "warnings": partial(diagnostics.motion_warnings, result),
-        "doubtful": partial(diagnostics.doubt_messages, result),
-    }
+    impulses = isinstance(health.options.get("method"), Mapping)
+    result.record = record_motion(result, accelerations=not impulses)
+    judgements = diagnostics.impulse_judgements if impulses else motion_judgements
+    health.late = judgements(result, parts[0].health.late["mobility"])
     return result

@@ -1,21 +1,19 @@
 """Diagnosis: why an integration could not continue; rounding limits; residual of the accelerations.
 
 `failure_reason` finds the cause of a failure: a law that jumps or is not finite, contradictory drivers, a lock-up, a
-friction jam, an unbounded motion, too many steps. `acceleration_violation` checks G vdot = gamma independently of the
-solver.
+friction jam, an unbounded motion, too many steps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..assembly.assembled_state import Assembly, undefined_row
-from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..assembly.compiled_mechanism import CompiledMechanism
 from ..constraints.switches.guard_kinds import OFF
 from ..engine import motion
 from ..engine.entry_point import MOTION
@@ -32,12 +30,12 @@ from ..model.expression_parser import tree_text
 from ..model.force import CoordinateForce
 from ..model.messages import abbreviated
 from ..numerics.integrators import time_loop as ex
-from ..tables.table_definitions import LOAD, REVOLUTE, VALUE
+from ..tables.table_definitions import LOAD, REVOLUTE
 from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
 from .sampling_instants import sampling_limits_steps
 
 if TYPE_CHECKING:
-    from ..results.result import Result
+    pass
 
 
 class UnresolvedInstant(SimulationError):
@@ -57,23 +55,22 @@ def jam_message(e: Any, t: float, single: bool) -> str:
     if not single:
         where = f"of {body_names(e)}" if isinstance(e, Touch) else f"in joint {e.joint!r}"
         return (
-            f"{e.title} {where}: at t = {t:.6g} s no loads were found that go with the friction that they cause, here "
-            f"and elsewhere. Either friction grows with the load that it makes itself faster than that can hold it (a "
-            f"jam, or Painleve's paradox), or there are such loads and the search ended short of them. Less friction "
-            f"is easier (coefficients, radius, bending_length, twist_length); steps by impulses (method='impulse') "
-            f"need no such search"
+            f"{e.title} {where}: at t = {t:.6g} s no joint loads were found that are consistent with the friction "
+            "that they cause. Either there are none, since friction increases its own load too much (a jam, or "
+            "Painleve's paradox), or the iteration did not converge to them. It converges better with less friction "
+            "(coefficients, radius, bending_length, twist_length); impulse time stepping (method='impulse') needs no "
+            "such iteration"
         )
     if isinstance(e, Touch):
         return (
-            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there grows with the load that it "
-            "makes itself "
-            f"faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With less "
-            f"friction, or contact that gives way (law=), there is a solution; steps by impulses go over it"
+            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there increases its own normal force so "
+            "much that there is no finite solution, or several (Painleve's paradox). With less friction, or "
+            "compliant contact (law=), there is a solution; impulse time stepping passes over it"
         )
     return (
-        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
-        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
-        f"over which the joint carries moments (bending_length, twist_length)"
+        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction increases the joint's load by as much as the "
+        "load that causes it, so that there is no finite solution, or several. Check its coefficients, and the "
+        "lengths over which the joint carries moments (bending_length, twist_length)"
     )
 
 
@@ -136,10 +133,9 @@ def rounding_error_remark(clock: ex.StepState) -> str:
     if not size > NOTABLE:
         return ""
     return (
-        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to "
-        "a singular "
-        f"position, the last digits of the state alone change a step by up to {size:.2g} times what "
-        f"rtol = {clock.real.rtol:g} allows. The step was accepted so; a larger rtol asks for what can be had"
+        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to a "
+        f"singular position, rounding of the state alone changes a step by up to {size:.2g} times what rtol = "
+        f"{clock.real.rtol:g} allows. The step was accepted; a larger rtol can be satisfied"
     )
 
 
@@ -161,79 +157,19 @@ def rounding_suffix(clock: ex.StepState) -> str:
     if clock.real.t - clock.real.rounding_found_at > RECENT_SHARE * clock.real.span:
         return ""
     return (
-        f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
-        f"more, as they do close to a singular position; rtol = {clock.real.rtol:g} asks for more than can be had"
+        ". Rounding is the limit there: rounding of the state changes the error of a step by a tenth of it or more, "
+        f"as it does close to a singular position; rtol = {clock.real.rtol:g} cannot be satisfied"
     )
 
 
-MOST_TIMES = 100  # largest number of output times that are checked
-NEGLIGIBLE_ACCELERATION = (
-    1e-14  # relative to the mechanism's length (or a radian) over the squared duration; smaller ones are rounding
-)
-
-
-def acceleration_violation(result: Result) -> float:
-    """Return the largest |G vdot - gamma| at up to `MOST_TIMES` output times, relative to its terms.
-
-    It is evaluated in absolute coordinates whatever the coordinates of the motion, since in others the contributions of
-    two bodies to a row cancel. The terms are |G| M^-1 |f| (accelerations without constraints, which reactions cancel),
-    |G| |vdot|, and the terms of gamma: angular velocities times rates of the rows. At rest or in steady motion the
-    accelerations are only the rounding of these terms; without forces all terms are rounding
-    (`NEGLIGIBLE_ACCELERATION`). With Baumgarte's stabilization gamma includes its terms.
-    """
-    n, old = len(result.t), result.values.structure
-    if not n or not (result.model.joints or result.model.drivers or old.switches):
-        return 0.0
-    if result.pieces:
-        return max(map(acceleration_violation, result.pieces))
-    told = result.values.told
-    own = compile_mechanism(result.model, parameters=told, tree=old.tree, switches=result.phases is not None)
-    c = own
-    if old.tree:
-        c = compile_mechanism(result.model, parameters=told, switches=result.phases is not None)
-    if not len(c.structure.rows):
-        return 0.0
-    picked = np.unique(np.linspace(0, n - 1, min(n, MOST_TIMES)).astype(int)).tolist()
-    accelerations, sizes = _accelerations(result, c), c.sizes
-    held = None if result.phases is None else result.phases.over("switch")
-    span, worst = float(np.ptp(result.t)), 0.0
-    least = NEGLIGIBLE_ACCELERATION / span**2 if span > 0.0 else 0.0
-    for k in picked:
-        q, v, own.z = result.q[k].copy(), result.v[k].copy(), result.states[k].copy()
-        if c is not own:
-            q, v = c.take(own, result.t[k], q, v)
-        if held is not None:
-            c.work.modes.mode[:], c.work.modes.hold[:] = held[:2, :, k]
-            c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.phases.sigma[:, k]  # type: ignore[union-attr]
-        c.at(result.t[k], q, v, MOTION)
-        gap, largest, _ = acceleration_residual(c, v, accelerations[k], sizes, result.health.options)
-        largest = max(largest, least)
-        worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
-    return worst
-
-
-def _accelerations(result: Result, c: CompiledMechanism) -> np.ndarray:
-    """Return the accelerations of all bodies at all output times in the order of c's velocities, (n, nv)."""
-    out = np.zeros((len(result.t), c.structure.nv))
-    planar = c.structure.model.planar
-    for name, b in c.structure.place.items():
-        if b < 0:
-            continue
-        _, R, _, _, alpha, a = result.records.body(result.values.structure.place[name])
-        v0, n = int(c.values.system.tree.v[b]), int(c.values.system.tree.nv[b])
-        turns = [alpha[2]] if planar else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
-        out[:, v0 : v0 + n] = np.stack([*(a[:2] if planar else a), *turns][:n], axis=1)
-    return out
-
-
 def acceleration_residual(
-    c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
+    c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, float, float]:
     """Return the residual of accelerations x in each row, (nr,), the largest sum of a row's terms, and that without x's
     own.
 
     Rows in metres are divided by the mechanism's length. The state (velocities v) is the one in c's workspace,
-    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    evaluated with forces; ``sizes`` are c's.
     """
     S, n = c.values.system, len(c.structure.rows)
     row_p = S.row_start[: n + 1]
@@ -242,9 +178,7 @@ def acceleration_residual(
     def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.bincount(row, entries * x[column], n)
 
-    gamma = c.work.rows.gamma.copy()
-    if o is not None and o.get("stabilization") == "baumgarte":
-        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.rows.nu) + o["beta"] ** 2 * c.work.rows.value
+    gamma = c.work.rows.gamma
     turning = np.zeros(n)
     np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
     asked = times(abs(G), np.abs(_unconstrained_accelerations(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
@@ -333,8 +267,8 @@ def _overcome_fault(a: Assembly) -> str:
     if found is None:
         return ""
     return (
-        f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
-        f"function is at fault, mend it"
+        f"in a step that was then taken again, shorter, {found.message}. The motion does not contain that step; if "
+        "the function is wrong, correct it"
     )
 
 
@@ -423,10 +357,9 @@ def _unbounded_derivative(near: list[tuple], when: str) -> str:
     for what, *sizes in zip(DERIVATIVE_NAMES[1:], *(np.abs(jet[1:]) for jet in near), strict=True):
         if all(x > GROWTH_FACTOR * y for x, y in pairwise(sizes)):
             return (
-                f"has a {what} that grows without bound just {when}, which asks for an infinite "
-                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite "
-                "derivatives (a power "
-                f"of what becomes zero: an exponent of 2 or more), or step5, which goes over smoothly"
+                f"has a {what} that grows without bound just {when}, which requires an infinite "
+                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite derivatives "
+                "(a power of what becomes zero: an exponent of 2 or more), or step5, which changes smoothly"
             )
     return ""
 
@@ -435,16 +368,15 @@ def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str
     """Describe a jump between value and derivatives just before and just after an instant; empty if there is none."""
     if not all(map(math.isfinite, before)):
         return ""
-    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) goes over smoothly"), (1, "step5 or a cubic Table goes smoothly")):
+    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) changes smoothly"), (1, "step5 or a cubic Table changes smoothly")):
         change = after[k] - before[k]
         if wrapped and k == 0:
             change = math.atan2(math.sin(change), math.cos(change))
         slope = max(abs(before[k + 1]), abs(after[k + 1]))
         if abs(change) > JUMP_FACTOR * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
             return (
-                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an "
-                "infinite force; "
-                f"{remedy}"
+                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which requires an "
+                f"infinite force; {remedy}"
             )
     return ""
 
@@ -467,9 +399,9 @@ def _not_finite_motion(a: Assembly, clock: ex.StepState, method: str) -> str:
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
     if not wrong.any() and (corners := _active_corners(a)):
         return (
-            f"just after t = {t:.6g} s nothing was found that holds the motion on the corner of the "
-            f"{' and the '.join(corners)}, or lets it go. Make that law smooth there: max(-1, min(1, x / width)) for "
-            f"sign(x)"
+            f"just after t = {t:.6g} s no motion was found that stays on the corner of the "
+            f"{' and the '.join(corners)}, or leaves it. Make that law smooth there: max(-1, min(1, x / width)) for "
+            "sign(x)"
         )
     return (
         f"the equations of motion are not finite just after t = {t:.6g} s, first at "
@@ -510,7 +442,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
         for k, e in enumerate(forces):
             if isinstance(e, Touch):
                 if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
-                    return f"what {e.title} presses with is no number"
+                    return f"the normal force of {e.title} is not finite"
                 continue
             F, M, par = (
                 load_record(W.FK, S.forces.F[k]),
@@ -519,7 +451,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
             )
             x, y = law_inputs(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
-                return f"what {e.title} measures is no number. {e.fails}"
+                return f"the measured quantity of {e.title} is not finite. {e.fails}"
             laws = [
                 float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
                 for at in S.forces.laws[k].tolist()
@@ -599,10 +531,10 @@ def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
     why = explain_contradiction(c, t, q, v, c.work.rows.gamma.copy(), "/s^2") or (
-        "in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
-        "than its links allow), or it is drawn in a singular position with velocities that it cannot have"
+        "in this position no acceleration satisfies them with these velocities. The mechanism locks (a driver may "
+        "prescribe more than its links allow), or it starts in a singular position with impossible velocities"
     )
-    return f"at t = {t:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: {why}"
+    return f"at t = {t:.6g} s no accelerations satisfy the constraints of {', '.join(names[:8])} together: {why}"
 
 
 def _friction_jam(a: Assembly, clock: ex.StepState) -> str:
@@ -628,11 +560,11 @@ def _step_too_small(a: Assembly, clock: ex.StepState) -> str:
         )
     what = f"{t}: the step width fell to {clock.real.h:.3g} s{where}" if begun else f"its start, {t}{where}"
     if rounding := rounding_suffix(clock):
-        return f"the integration cannot go on at {what}{rounding}"
+        return f"the integration cannot continue at {what}{rounding}"
     return (
-        f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "
-        f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
-        f"a force that changes abruptly"
+        f"the integration cannot continue at {what}. The mechanism may lock there (a driver prescribes more than its "
+        "links allow), pass a singular position that the tolerance cannot resolve (a larger rtol steps over it), or "
+        "a force changes abruptly"
     )
 
 
@@ -646,9 +578,9 @@ def _too_many_steps(a: Assembly, clock: ex.StepState) -> str:
         return text
     slowest = _component_name(a, _fastest_component(clock))
     return (
-        f"max_steps = {clock.count.limit} steps were taken by t = {clock.real.t:.6g} s; they are "
-        f"{clock.real.h:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
-        f"rtol, or less stiffness (friction too is stiff) there"
+        f"max_steps = {clock.count.limit} steps were taken up to t = {clock.real.t:.6g} s; the last ones are "
+        f"{clock.real.h:.3g} s long because of {slowest}. Give more steps (max_steps=), a larger rtol, or less "
+        "stiffness (friction too is stiff) there"
     )
 
 

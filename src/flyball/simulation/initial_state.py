@@ -68,7 +68,7 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     """
     refuse_unknown_coordinates(wish)
     if wish == "absolute":
-        return a, "absolute: as asked for"
+        return a, "absolute: as requested"
     if why := _indeterminate_loads(a):
         if wish == "joint":
             raise AnalysisError(
@@ -82,8 +82,11 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     if wish == "auto":
         there = _evaluation_cost(c.structure)
         if here <= there:
-            return a, f"absolute: {_size_in_words(a.compiled)} cost less than {_size_in_words(c)} in joint coordinates"
-        why = f"{_size_in_words(c)} cost less than {_size_in_words(a.compiled)} in absolute coordinates"
+            return (
+                a,
+                f"absolute: {_size_in_words(a.compiled)} (joint coordinates need {_size_in_words(c)}, and more time)",
+            )
+        why = f"{_size_in_words(c)} (absolute coordinates need {_size_in_words(a.compiled)}, and more time)"
     else:
         why = "as asked for"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
@@ -107,8 +110,8 @@ def _indeterminate_loads(a: Assembly) -> str:
     titles = ", ".join(found)
     names = ", ".join(m.redundant[:8])
     return (
-        f"{titles} follow{'s' if len(found) == 1 else ''} reactions that the constraints of {names} leave open; "
-        f"what each carries is then a choice (the least for its size), which is made for rows"
+        f"{titles} follow{'s' if len(found) == 1 else ''} reactions that the redundant constraints of {names} leave "
+        "undetermined; the reactions of least norm are used, which are defined in absolute coordinates"
     )
 
 
@@ -119,7 +122,7 @@ def refuse_unknown_coordinates(wish: str) -> None:
 
 
 def _size_in_words(c: CompiledMechanism) -> str:
-    return f"{c.structure.nv} velocities with {len(c.structure.rows)} rows"
+    return f"{c.structure.nv} velocities and {len(c.structure.rows)} constraint equations"
 
 
 def _cut_joints(c: CompiledMechanism) -> str:
@@ -128,7 +131,7 @@ def _cut_joints(c: CompiledMechanism) -> str:
     cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
     if not cut:
         return ""
-    return f"; rows remain for {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
+    return f"; loops are cut at {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
 
 
 def _sound_forest(
@@ -146,7 +149,7 @@ def _sound_forest(
             what = " that has inertia along its coordinates" if avoided else ""
             return None, f"no joint{what} can be a tree joint"
         if model.kept.get("least", tree, MOST_AVOIDED, partial(least_cost, model, tree)) > most:
-            return None, f"{_size_in_words(a.compiled)} cost less than the mass matrix alone in joint coordinates"
+            return None, f"{_size_in_words(a.compiled)} (in joint coordinates the mass matrix alone needs more time)"
         c = compile_mechanism(model, parameters=parameters, tree=tree)
         bad = _massless_tree_joint(c, a)
         if bad is None:
@@ -247,7 +250,7 @@ def start_time(t_start: float | None, before: Result | None) -> float:
     if not isinstance(before, Result):
         raise ModelError(f"start is a result of simulate, not {type(before).__name__}")
     if t_start is not None:
-        raise ModelError("a motion that goes on from a result starts where that ended: leave out t_start, or start")
+        raise ModelError("a continued motion starts where the result ended: leave out t_start, or start")
     return before.final[0]
 
 
@@ -522,9 +525,9 @@ def _refuse_difference(
     worst = max(off, key=lambda name: off[name] if off[name] == off[name] else np.inf)
     if not off[worst] <= most:
         raise ModelError(
-            f"the result of {before.model.name!r} cannot be gone on with: {worst} of {c.structure.model.name!r} is "
-            f"{off[worst] * size:.3g}{what} from where the result ended. Were parameters or parts changed? A change "
-            "must leave every body where it is, and as fast"
+            f"the result of {before.model.name!r} cannot be continued: {worst} of {c.structure.model.name!r} is "
+            f"{off[worst] * size:.3g}{what} from where the result ended. Parameters or parts may have changed: a "
+            "change must keep the position and velocity of every body"
         )
 
 

@@ -43,7 +43,7 @@ def remark_on_checked_laws(c: CompiledMechanism, sampled: frozenset[int]) -> str
         return ""
     names = dict.fromkeys(c.structure.laws[at] for at in sorted(sampled))
     first = ", ".join(list(names)[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-    return f"{first}: sampled within steps; what a state passes between two samples is not seen"
+    return f"{first}: evaluated at points within each step; a crossing and its return between two points can be missed"
 
 
 PAUSED_MESSAGE = "not at its end: kept at t = {:.6g} s"

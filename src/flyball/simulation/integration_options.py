@@ -66,7 +66,7 @@ class Integration(Options):
             if own[name] is not None or name in ("rtol", "max_step"):
                 require_positive(own[name], name)
         if self.step is not None and self.max_step != np.inf:
-            raise ModelError("max_step does nothing with steps of fixed width (step=); leave one of the two out")
+            raise ModelError("max_step has no effect with fixed steps (step=); leave one of the two out")
         require_count(self.max_steps, "max_steps")
         if self.rtol < FINEST_RTOL:
             raise ModelError(
@@ -74,8 +74,8 @@ class Integration(Options):
             )
         if self.rtol > COARSEST_RTOL:
             raise ModelError(
-                f"rtol must not be larger than {COARSEST_RTOL:g}, got {self.rtol!r}: every step might be off by that "
-                f"part of the motion"
+                f"rtol must not be larger than {COARSEST_RTOL:g}, got {self.rtol!r}: every step might have this "
+                "relative error"
             )
         known_coordinates(self.coordinates)
         if self.stabilization not in STABILIZATION:
@@ -90,14 +90,14 @@ class Integration(Options):
             tableau(self.method)
         except ValueError as error:
             raise ModelError(
-                f"{error}; simulate knows implicit ones too (radau for stiff mechanisms), and impulse, for contact"
+                f"{error}; simulate also has implicit methods (radau for stiff mechanisms), and impulse, for contact"
             ) from None
         self.refuse_without_step()
 
     def refuse_without_step(self) -> None:
         """Refuse a method without error estimate if no step width is given."""
         if self.step is None and not tableau(self.method).E.any():
-            raise ModelError(f"method={self.method!r} has no estimate of its error: give the width of its steps, step=")
+            raise ModelError(f"method={self.method!r} does not estimate its error: give the step size, step=")
 
     def _rates(self) -> None:
         """Set the default rates of Baumgarte's method; refuse rates with any other stabilization."""
@@ -108,8 +108,8 @@ class Integration(Options):
                 require_positive(value, name)
                 object.__setattr__(self, name, value)
             elif value is not None:
-                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it does "
-                                 f"nothing")  # fmt: skip
+                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it has "
+                                 "no effect")  # fmt: skip
 
     def sized(self, length: float) -> Self:
         """Return the options with `tolerance` as ``atol``."""
@@ -159,7 +159,8 @@ def refuse_beyond_memory(outputs: int, width: int) -> None:
     if outputs * each > SMALL_MEMORY and outputs * each > (there := _memory_of_machine()):
         raise ModelError(
             f"outputs: {outputs:,} times take {outputs * each // 2**20:,} MiB of memory or more, and this machine has "
-            f"{there // 2**20:,} MiB. Ask for fewer ({there // each:,} would fill it), or simulate in parts (start=)"
+            f"{there // 2**20:,} MiB. Give fewer output times ({there // each:,} would fill it), or simulate in parts "
+            "(start=)"
         )
 
 
@@ -276,8 +277,8 @@ class Stepping:
                 )
         if self.impacts == "sequential" and self.restitution != "poisson":
             raise ModelError(
-                f"impacts='sequential' of Stepping go by Poisson's law, so restitution={self.restitution!r} would do "
-                f"nothing; leave one of the two out"
+                f"impacts='sequential' of Stepping uses Poisson's law, so restitution={self.restitution!r} has no "
+                "effect; leave one of the two out"
             )
 
         if self.solver in CONVEX_ONLY_SOLVERS and self.coulomb:

@@ -222,9 +222,9 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
     if not step > longest:
         return ""
     return (
-        f"a step of {step:g} s is too long for {method}: what changes fastest where it begins does so at {rate:.3g} "
-        f"1/s, which this method follows stably in steps of up to {longest:.2g} s. Give such a step, or leave step "
-        f"out, and its width is chosen; or take method='radau'"
+        f"a step of {step:g} s is too long for {method}: the fastest rate at its start is {rate:.3g} 1/s, for which "
+        f"this method is stable with steps up to {longest:.2g} s. Give such a step, leave step out to have it chosen, "
+        "or take method='radau'"
     )
 
 
@@ -235,8 +235,9 @@ def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) ->
         return ""
     i = int(np.argmax(grown))
     return (
-        f"the motion grows without bound: by t = {clock.real.t:.6g} s {_component_in_words(a, i, float(y[i]), named)}. "
-        f"Look for what drives it: a gain, a damping or a stiffness of the wrong sign, a controller that is unstable"
+        f"the motion grows without bound: by t = {clock.real.t:.6g} s "
+        f"{_component_in_words(a, i, float(y[i]), named)}. Possible causes: a gain, damping or stiffness of the wrong "
+        "sign, an unstable controller"
     )
 
 
@@ -298,8 +299,8 @@ def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
                 given = f" for {given}" if given else ""
                 return (
                     f"at t = {t:.6g} s the law of {e.title} gives {here:.3g}{given} and grows without bound: the "
-                    f"motion has no continuation. Where parts meet that attract each other as 1/r**2, give the law a "
-                    f"bound, 1/(r**2 + a**2), or keep the parts apart by a stop (Limit, Touch)"
+                    "motion has no continuation. If parts that attract each other as 1/r**2 meet, bound the law, "
+                    "1/(r**2 + a**2), or keep the parts apart by a stop (Limit, Touch)"
                 )
     return ""
 

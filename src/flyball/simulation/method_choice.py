@@ -48,7 +48,7 @@ def unsupported_contacts(model: Model, parameters: Mapping[str, float] | None) -
     if not (model.contacts or model.bulk):
         return ""
     p = contact_points(model, parameters)
-    return f"{_first_of_several(p.why_not)}, which only steps by impulses know" if p.why_not else ""
+    return f"{_first_of_several(p.why_not)}, which only impulse time stepping supports" if p.why_not else ""
 
 
 def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
@@ -57,7 +57,7 @@ def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> s
     """
     places = contact_points(model, parameters).touches
     if len(places) > FEW:
-        return f"bodies may touch at {len(places)} places, too many to go from touch to touch (most {FEW})"
+        return f"bodies may touch at {len(places)} points, too many for event-driven integration (at most {FEW})"
     return "" if model.planar else _indeterminate_friction(places)
 
 
@@ -83,8 +83,8 @@ def with_contact_points(model: Model, parameters: Mapping[str, float] | None) ->
     p = contact_points(model, parameters)
     if p.why_not:
         raise ModelError(
-            f"{model.contacts[0].title}: a motion that is integrated knows contact of balls, corners and rounded ends "
-            f"with planes, of balls with balls, boxes and capsules, and in the plane of rectangles and segments. Here "
+            f"{model.contacts[0].title}: event-driven integration supports contact of balls, corners and rounded ends "
+            "with planes, of balls with balls, boxes and capsules, and in the plane of rectangles and segments. Here "
             f"{_first_of_several(p.why_not)}; {IMPULSE_REMEDY}"
         )
     key = element_numbers(model, parameters).key
@@ -136,7 +136,7 @@ def refuse_idle_options(o: Any) -> None:
         )
     if o.specialize is True:
         raise ModelError(
-            f"specialize=True does nothing with method={o.method!r}, which is computed by the tables; leave it out"
+            f"specialize=True has no effect with method={o.method!r}, which uses the general engine; leave it out"
         )
 
 
@@ -166,8 +166,8 @@ def in_suitable_coordinates(
     elif s.prescribed:
         if wish == "joint":
             raise ModelError(
-                f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as "
-                f"they are in joint coordinates: leave coordinates out"
+                f"method={method!r} does not support coordinates that drivers prescribe ({', '.join(s.prescribed)}), "
+                "as they are in joint coordinates: leave coordinates out"
             )
         why = "drivers' coordinates are rows in an implicit method"
     elif wish == "auto" and (groups := _jacobian_groups(start)) > MOST_JOINT_GROUPS:
@@ -188,7 +188,7 @@ def reason_against_implicit(start: InitialState) -> str:
     except ModelError as error:
         return str(error).removesuffix("; leave method out, or take the redundancy out")
     if start.assembly.compiled.values.system.scales.semidefinite > 0.0:
-        return "a body has no inertia about some axis, which method='radau' does not know"
+        return "a body has no inertia about some axis, which method='radau' does not support"
     if not s.tree:
         return ""
     if s.prescribed:
@@ -207,8 +207,8 @@ def _refuse_open_loads(start: InitialState, method: str) -> None:
     if found:
         names = ", ".join(f.title for f, _ in found)
         raise ModelError(
-            f"method={method!r} cannot have {names}: it follows reactions that redundant constraints leave open "
-            f"(m.mobility() names them); leave method out, or take the redundancy out"
+            f"method={method!r} cannot have {names}: it depends on reactions that redundant constraints leave "
+            "undetermined (m.mobility() names them); leave method out, or remove the redundancy"
         )
 
 
@@ -247,7 +247,7 @@ INTEGRATOR_DEFAULTS = {
     "rho_inf": None,
 }  # fmt: skip
 """Integration options without effect on impulse time stepping, with their defaults."""
-IMPULSE_STEPPING = "steps by impulses"
+IMPULSE_STEPPING = "impulse time stepping"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,11 +276,11 @@ class SimulateOptions(Integration):
             return
         if self.method != GENERALISED_ALPHA:
             raise ModelError(
-                f"rho_inf is a number of method={GENERALISED_ALPHA!r}; with method={self.method!r} it does nothing"
+                f"rho_inf belongs to method={GENERALISED_ALPHA!r}; with method={self.method!r} it has no effect"
             )
         if isinstance(self.rho_inf, bool) or not isinstance(self.rho_inf, Real) or not 0.0 <= self.rho_inf <= 1.0:
-            raise ModelError(f"rho_inf is a number from 0 (swings too fast for a step go at once) to 1 (no swing is "
-                             f"damped), got {self.rho_inf!r}")  # fmt: skip
+            raise ModelError("rho_inf is a number from 0 (oscillations too fast for the step are removed at once) to "
+                             f"1 (no oscillation is damped), got {self.rho_inf!r}")  # fmt: skip
 
     def check_method(self) -> None:
         """Check that the method is an integrator, impulse time stepping, or ``"auto"``."""
@@ -330,32 +330,30 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
     touch = bool(model.contacts or model.bulk)
     if o.method == VARIATIONAL and model.controllers:
         raise ModelError(
-            f"method={o.method!r} is for motions that keep their energy, with works of second order at most, and does "
-            f"not know {model.controllers[0].title}: leave method out, or give method='radau'"
+            f"method={o.method!r} is for conservative motions, and computes works with an error of second order; it "
+            f"does not support {model.controllers[0].title}: leave method out, or give method='radau'"
         )
     if not isinstance(o.method, Stepping) and o.method != IMPULSE_METHOD:
         if model.bulk:
             raise ModelError(
-                f"method={o.method!r} integrates from event to event, which does not know {model.bulk[0].title}: leave "
-                f"method out, or give method={IMPULSE_METHOD!r}"
+                f"method={o.method!r} is event-driven, which does not support {model.bulk[0].title}: leave method "
+                f"out, or give method={IMPULSE_METHOD!r}"
             )
         return MethodChoice(o, _remark_on_requested(o, touch))
     given = [f"{name}={getattr(o, name)!r}" for name in _given_options(o)]
     if unknown := _unknown_to_impulse_stepping(model):
         raise ModelError(
-            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method "
-            "out, or give "
-            f"method={DEFAULT_INTEGRATOR!r}"
+            f"{IMPULSE_STEPPING} does not support {', '.join(unknown)}; the adaptive integrators do: leave method "
+            f"out, or give method={DEFAULT_INTEGRATOR!r}"
         )
     if given:
         instead = "; Stepping(step=...) is theirs" if o.step is not None else ""
         raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
-            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave "
-            "coordinates out"
+            f"{IMPULSE_STEPPING} uses absolute coordinates, where joints close to rounding; leave coordinates out"
         )
-    return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as asked")
+    return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as requested")
 
 
 def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
@@ -364,10 +362,10 @@ def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
     if o.method == GENERALISED_ALPHA:
         parts.append(f"rho_inf = {DEFAULT_RHO_INF if o.rho_inf is None else o.rho_inf:g}")
     if o.method in IMPLICIT_METHODS and o.stabilization == "none":
-        parts.append("index 3: velocities are not held to the constraints")
+        parts.append("index 3: velocities are not projected on the constraints")
     if not (touch or parts or o.method in IMPLICIT_METHODS):
         return ""
-    return ", ".join([f"{o.method}, as asked", *parts]) + (": from touch to touch" if touch else "")
+    return ", ".join([f"{o.method}, as requested", *parts]) + (": event-driven" if touch else "")
 
 
 def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
@@ -381,19 +379,19 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
     cannot = unsupported_contacts(model, o.parameters)
     if cannot and asking:
         raise ModelError(
-            f"{model.name!r} can be moved by no method with all that is asked: {cannot}; and {asking[0]} is not known "
-            f"to {IMPULSE_STEPPING}. Leave one of the two out"
+            f"{model.name!r} cannot be simulated by any method with all these elements: {cannot}; and "
+            f"{IMPULSE_STEPPING} does not support {asking[0]}. Leave one of the two out"
         )
     if cannot:
         return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {cannot}")
     if asking:
         return MethodChoice(
-            adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch: {asking[0]} is not known to {IMPULSE_STEPPING}"
+            adaptive, f"{DEFAULT_INTEGRATOR}, event-driven: {IMPULSE_STEPPING} does not support {asking[0]}"
         )
     why = too_many_contacts(model, o.parameters) or _continues_impulse_stepping(o.start)
     if why:
         return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {why}")
-    return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch", _impulse_options(o))
+    return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, event-driven", _impulse_options(o))
 
 
 def _unknown_to_impulse_stepping(model: Model) -> list[str]:
@@ -415,7 +413,7 @@ def _continues_impulse_stepping(start: Result | None) -> str:
     """Return the reason for impulse time stepping if the earlier result used it; else an empty string."""
     if start is None or not isinstance(start.health.options.get("method"), Mapping):
         return ""
-    return "so went the motion that this one goes on from"
+    return "as in the motion that this one continues"
 
 
 def is_unresolved(error: BaseException) -> bool:
@@ -428,4 +426,4 @@ def is_unresolved(error: BaseException) -> bool:
 def reason_for_impulses(error: BaseException) -> str:
     """Return the health remark on why impulse time stepping replaced the integration."""
     found = error.__cause__ if isinstance(error.__cause__, UnresolvedInstant) else error
-    return f"{IMPULSE_STEPPING}, since from touch to touch it does not go: {found}"
+    return f"{IMPULSE_STEPPING}, since event-driven integration failed: {found}"

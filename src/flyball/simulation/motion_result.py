@@ -27,9 +27,9 @@ from ..numerics.integrators.butcher_tableaux import tableau
 from ..results import diagnostics
 from ..results.event_driven_contacts import event_driven_contacts
 from ..results.health import Health, changed_velocities, velocity_not_allowed
+from ..results.motion_record import record_motion
 from ..results.result import DeferredArrays, Result
 from .diagnosis import (
-    acceleration_violation,
     contradicting_limits,
     driver_fault,
     failure_reason,
@@ -119,7 +119,7 @@ def make_result(
     t = float(clock.real.t)
     message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
-        message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+        message = f"interrupted by the user at t = {t:.6g} s; the motion so far is kept"
     elif here.start.part.paused:
         message = PAUSED_MESSAGE.format(t)
     elif here.failed is not None:
@@ -145,21 +145,29 @@ def make_result(
     result.carried |= continuation_data(here)
     if here.start.part.paused:
         result.carried |= _data_for_next_segment(here, deferred is not None)
-    health.late = {
-        "mobility": partial(mobility, model, start.base),
-        "energy_drift": partial(_energy_drift, result),
-        "acceleration_violation": partial(acceleration_violation, result),
-        "creep": partial(diagnostics.friction_creep, result),
-        "warnings": partial(diagnostics.motion_warnings, result),
-        "doubtful": partial(diagnostics.doubt_messages, result),
-    }
     result.events = here.records
     if here.recorder is not None:
         here.recorder.told(result)
         result.contacts = event_driven_contacts(result)
+    result.record = record_motion(result, a.compiled.scratch)
+    if unsolved is not None and not result.record.solved:
+        _ = result.vdot  # adds to the remarks where there are no accelerations
+    health.late = motion_judgements(result, partial(mobility, model, start.base))
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
+
+
+def motion_judgements(result: Result, mobility: Callable[[], Any]) -> dict[str, Callable[[], Any]]:
+    """Return the figures of `Health.late` of a motion, from what its record contains."""
+    return {
+        "mobility": mobility,
+        "energy_drift": partial(diagnostics.energy_drift, result),
+        "acceleration_violation": partial(diagnostics.acceleration_violation, result),
+        "creep": partial(diagnostics.friction_creep, result),
+        "warnings": partial(diagnostics.motion_warnings, result),
+        "doubtful": partial(diagnostics.doubt_messages, result),
+    }
 
 
 def _cause_of_failed_step(a: Assembly, clock: ex.StepState) -> str:
@@ -200,7 +208,3 @@ def _health(start: InitialState, clock: ex.StepState, o: Integration) -> Health:
         coordinates=start.coordinates,
         engine=start.engine.told if start.engine else "",
     )
-
-
-def _energy_drift(result: Result) -> float:
-    return result.energy.drift

@@ -322,7 +322,7 @@ def _friction_at_rest(history: SwitchHistory) -> list[str]:
         still = np.abs(rate) <= STOP_TOLERANCE * np.abs(rate).max(initial=0.0)
         if spec.switch.kind.kinetic and still.any():
             out.append(
-                f"{spec.element.title} is taken as nothing where it does not slide: what it carries there of what the "
-                f"drives need is not determined"
+                f"{spec.element.title} is taken as zero where it does not slide: its share of the driving forces "
+                "there is not determined"
             )
     return out

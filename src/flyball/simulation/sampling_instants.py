@@ -70,7 +70,8 @@ def sampling_limits_steps(c: CompiledMechanism, clock: ex.StepState, t_start: fl
     for x in sampled_by_period(c)[:1]:
         if x.between(t_start, t) >= SAMPLING_SHARE * clock.count.accepted:
             return (
-                f"max_steps = {clock.count.limit} steps were taken by t = {t:.6g} s. {x.told(t, end)}. {PERIOD_REMEDY}"
+                f"max_steps = {clock.count.limit} steps were taken up to t = {t:.6g} s. {x.told(t, end)}. "
+                f"{PERIOD_REMEDY}"
             )
     return ""
 

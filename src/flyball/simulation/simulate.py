@@ -54,7 +54,10 @@ from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, St
 
 TIGHT_TOLERANCE = 1e-8  # relative tolerances below this tighten the constraint tolerance of the stages quadratically
 UNSUPPORTED_BY_GENERATED = {
-    "partitioning": "partitioning chooses coordinates on the way, which made code does not know"
+    "partitioning": (
+        "coordinate partitioning changes coordinates during the motion, which code made for one mechanism does not "
+        "support"
+    )
 }
 """Stabilizations that generated code does not support, each with the reason."""
 SLICE = 0.05  # intended duration of one call of the compiled loop [s]
@@ -134,7 +137,7 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
     made = False if o.method in IMPLICIT_METHODS else o.specialize
     begun.engine = CodeSelection(begun.assembly.compiled, made, UNSUPPORTED_BY_GENERATED.get(o.stabilization, ""))
     if o.method in IMPLICIT_METHODS:
-        begun.engine.told = f"{GENERAL_ENGINE}: {o.method} goes through the tables"
+        begun.engine.told = f"{GENERAL_ENGINE}: {o.method} uses it"
     mixed = auto and o.stabilization == "projection" and o.step is None
     begun.pace = StiffnessMonitor(
         float(o.t_end), AUTO_METHOD if mixed else str(o.method), partial(reason_against_implicit, begun)
@@ -227,8 +230,8 @@ def _refuse_idle_stabilization(start: InitialState, stabilization: str) -> None:
         joint = len(start.base.compiled.values.system.rows.law) > 0
         where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
         raise ModelError(
-            f"stabilization={stabilization!r} does nothing: {where}no constraint is left to be kept; leave it out"
-            f"{remedy}"
+            f"stabilization={stabilization!r} has no effect: {where}there are no constraints to stabilise; leave it "
+            f"out{remedy}"
         )
 
 

@@ -44,9 +44,9 @@ LOAD_COST = 1.5e5  # cost of code on disk [ns] that one motion must save; later 
 # (Loading takes 3 ms, and computing the key of the code 10 ms, once per process)
 MOST_STEPS_PER_CALL = 100_000  # steps in one call of the compiled loop
 FAILED_STATUS = (ex.STEP_FAILED, ex.NOT_FINITE, ex.OUTPUT_FAILED)
-GENERAL_ENGINE, GENERATED_CODE = "table-driven", "made for this mechanism"
-TOO_SHORT = f"{GENERAL_ENGINE}: too little is computed to make code for it"
-NO_MODES = "rows that hold at times and let go at others, and events, are for the tables"
+GENERAL_ENGINE, GENERATED_CODE = "general engine", "made for this mechanism"
+TOO_SHORT = f"{GENERAL_ENGINE}: the motion is too short for code made for it"
+NO_MODES = "code made for one mechanism does not support stops, stick friction or events"
 
 
 MOST_KINDS = 256  # kinds of mechanisms in the account
@@ -151,7 +151,7 @@ class CodeSelection:
     """
 
     def __init__(self, c: CompiledMechanism, wish: bool | str, without: str = "") -> None:
-        self.c, self.told, self.due = c, f"{GENERAL_ENGINE}: asked for", math.inf
+        self.c, self.told, self.due = c, f"{GENERAL_ENGINE}: as requested", math.inf
         self._first = math.nan  # start time of the motion
         self._counted = 0
         if wish is False:
@@ -192,7 +192,7 @@ class CodeSelection:
         """
         if self.c.made is None or clock.count.status not in FAILED_STATUS:
             return False
-        self.told += f"; table-driven from t = {clock.real.t:.6g} s on, where it could not go on"
+        self.told += f"; general engine from t = {clock.real.t:.6g} s, where it failed"
         self.c.run_on_tables()
         clock.count.status, clock.real.max_growth = ex.RUNNING, 1.0
         clock.real.h = max(clock.real.h, clock.real.wide)

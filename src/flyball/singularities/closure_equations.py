@@ -264,8 +264,8 @@ def release_driver(model: Model, driver: str, t: float, parameters: Mapping[str,
     own = a.compiled.structure
     if loose := sorted({r.element.name for r in own.rows if not r.holonomic}):
         raise ModelError(
-            f"{model.name!r}: {', '.join(loose)} restrain velocities only, so where the mechanism is depends on its "
-            f"way there, and positions cannot be followed over a driver's coordinate"
+            f"{model.name!r}: {', '.join(loose)} constrain velocities only, so that the position depends on the path, "
+            "and is no function of a driver's coordinate"
         )
     env = model.environment(parameters)
     copy = model.copy()

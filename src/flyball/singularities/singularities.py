@@ -215,8 +215,8 @@ def _refuse_unreachable(
         dict.fromkeys(s.rows[k].element.name for k in np.flatnonzero(weight > 1e-3 * weight.max(initial=0.0)))
     )
     raise SingularityError(
-        f"{f.model.name!r}: driver {f.driver.name!r} cannot come to {least:g} .. {most:g} {f.unit} from where the "
-        f"mechanism is drawn ({f.driver.coordinate} = {x.a:.6g}): it locks up at {wall:.6g} {f.unit}",
+        f"{f.model.name!r}: driver {f.driver.name!r} cannot reach {least:g} .. {most:g} {f.unit} from the reference "
+        f"configuration ({f.driver.coordinate} = {x.a:.6g}): it locks up at {wall:.6g} {f.unit}",
         where=float(wall),
         elements=names,
     )
@@ -232,7 +232,7 @@ def _distinct_points(f: ReleasedMechanism, places: list[tuple[float, CurvePoint]
 
 def _no_freedom_error(f: ReleasedMechanism) -> MobilityError:
     others = [d.name for d in f.model.drivers if d.name != f.driver.name]
-    beside = f"; the other drivers ({', '.join(others)}) hold it" if others else ""
+    beside = f"; the other drivers ({', '.join(others)}) prevent it" if others else ""
     return MobilityError(
         f"{f.model.name!r}: driver {f.driver.name!r} cannot move {f.driver.coordinate}, since no freedom "
         f"is left{beside}",
@@ -265,8 +265,8 @@ def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
     count = held.shape[1]
     raise MobilityError(
         f"{f.model.name!r} has {count} freedom{'s' if count > 1 else ''} left besides driver {f.driver.name!r}: with "
-        f"{f.driver.coordinate} held, {', '.join(bodies[:8])} can still move ({', '.join(joints[:8]) or 'no joint'}). "
-        f"Add a driver for each, or joints that take them away",
+        f"{f.driver.coordinate} at rest, {', '.join(bodies[:8])} can still move "
+        f"({', '.join(joints[:8]) or 'no joint'}). Add a driver for each, or joints that remove them",
         free=tuple(joints or bodies),
     )
 

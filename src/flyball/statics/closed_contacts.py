@@ -148,13 +148,13 @@ def refuse_unknown_surfaces(scene: ContactTables) -> None:
     pair = scene.surfaces.pair
     pair = pair[~np.isnan(pair[..., su.STATIC])]
     what = (
-        ("a surface that moves (surface_velocity): what it drags along does not rest", bool(scene.surfaces.belt.any())),
+        ("a surface that moves (surface_velocity): bodies on it are not at rest", bool(scene.surfaces.belt.any())),
         ("rolling or spinning friction", bool((pair[..., [su.ROLLING, su.SPINNING]] > 0.0).any())),
         ("friction with a grain", bool((pair[..., su.ACROSS] != 1.0).any())),
     )
     for text, there in what:
         if there:
-            raise ModelError(f"statics does not know {text}; simulate does")
+            raise ModelError(f"statics does not support {text}; simulate does")
 
 
 def contact_rows(place: ContactState) -> np.ndarray:

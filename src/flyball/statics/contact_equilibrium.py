@@ -105,7 +105,9 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
         stepper.pace.count[RESTITUTION_LAW] = NO_RESTITUTION
         _Settling(scene, stepper, held, h, base).walk(model.name)
     except NoSolution:
-        raise AnalysisError(f"{model.name!r} cannot be settled: its equations have no solution on the way") from None
+        raise AnalysisError(
+            f"{model.name!r} does not come to rest: its equations have no solution during the settling motion"
+        ) from None
     kept = OutputRecorder(stepper, held, np.zeros(len(scene.carriers.mass) + 1, np.int64))
     kept.add(False)
     q, v, vdot = free_coordinates(base, scene, kept)
@@ -212,8 +214,8 @@ class _Settling:
         who = max(speed, key=lambda k: speed[k])
         return NotConverged(
             f"{name!r} does not come to rest: after {SETTLING_STEPS * self.h:.3g} s {who!r} still moves at "
-            f"{speed[who]:.3g} m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, "
-            f"or begin nearer to where it rests",
+            f"{speed[who]:.3g} m/s: it falls, slides or rolls away. Add friction, a stop or a spring, or start nearer "
+            "to its position of rest",
             speed,
         )
 
@@ -252,8 +254,8 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
     found, bears = support_with_friction(model, place, x, held)
     if found.unbalanced > REST_BALANCE:
         raise NotConverged(
-            f"{model.name!r} came to rest where contacts and joints leave {found.unbalanced:.2g} of what acts "
-            f"unbalanced; begin nearer to where it rests",
+            f"{model.name!r} came to rest where contacts and joints leave the fraction {found.unbalanced:.2g} of the "
+            "forces unbalanced; start nearer to its position of rest",
             {},
         )
     return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))
@@ -274,10 +276,9 @@ def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float
         return place
     if unknown := not_for_impulse_stepping(model):
         raise NotConverged(
-            f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
-            f"to where it rests is found by steps of impulses, which do not know "
-            f"{', '.join(e.title for e in unknown)}: "
-            f"describe it where it rests, or simulate it with damping",
+            f"{model.name!r} is not in equilibrium in the reference configuration: {left:.2g} of the forces is left "
+            "unbalanced. The position of rest is found by impulse time stepping, which does not support "
+            f"{', '.join(e.title for e in unknown)}: describe it in its position of rest, or simulate it with damping",
             {},
         )
     return find_closed_contacts(model, settled_assembly(model, begin, parameters))
@@ -295,12 +296,14 @@ def refuse_bulk_and_events(model: Model, analysis: str) -> None:
     if model.events:
         without = ", ".join(f"{e.name!r}: None" for e in model.events)
         raise ModelError(
-            f"{analysis} knows no events, and {model.name!r} has {', '.join(e.title for e in model.events)}; simulate "
-            f"does. Without them: m.changed({{{without}}}).{analysis}(...)"
+            f"{analysis} does not support events, and {model.name!r} has {', '.join(e.title for e in model.events)}; "
+            f"simulate does. Without them: m.changed({{{without}}}).{analysis}(...)"
         )
     if model.bulk:
         names = ", ".join(e.title for e in model.bulk)
-        raise ModelError(f"{analysis} does not know {names}; describe what touches as single bodies, or simulate it")
+        raise ModelError(
+            f"{analysis} does not support {names}; describe bodies in contact one by one, or simulate the mechanism"
+        )
 
 
 def contacts_as_described(model: Model, t: float, parameters: Mapping[str, float] | None) -> ContactState:
@@ -360,7 +363,7 @@ def _contact_equilibrium_result(
         own,
         stability=kind,
         unbalanced=found.unbalanced,
-        method="steps of impulses" + (", then Newton's method" if smooth_result else ""),
+        method="impulse time stepping" + (", then Newton's method" if smooth_result else ""),
         parameters=dict(c.parameters),
         result=result,
         assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),
@@ -398,7 +401,7 @@ def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing
     """Notes for the result."""
     out = []
     for state, rule in (
-        (ABOUT_TO_PART, "nothing is carried there; what is said holds while it stays closed"),
+        (ABOUT_TO_PART, "it carries no force; the results are valid while it stays closed"),
         (AT_FRICTION_LIMIT, "any more load along it would make it slide"),
     ):
         names = [k.name for k in touches if k.state == state]
@@ -406,11 +409,14 @@ def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing
             out.append(f"{', '.join(names)} {state}: {rule}")
     if any(k.state in (STICKS, AT_FRICTION_LIMIT) for k in touches):
         out.append(
-            "friction holds it: positions nearby are equilibria too, and this is where it comes to rest from where it "
-            "begins; it is judged while its contacts stick"
+            "friction keeps it at rest: positions nearby are equilibria too, and this is the one reached from the "
+            "start; its stability is that with sticking contacts"
         )
     if not found.unique:
-        out.append("contacts and joints share the load in more than one way: their forces are one of these")
+        out.append(
+            "the distribution of the load on contacts and joints is not unique: their forces are one of several "
+            "solutions"
+        )
     if missing:
         out.append(f"stability is not judged: {missing}")
     return tuple(out)

@@ -593,8 +593,8 @@ def controlled_search_failure(x: RestState, other: AuxiliaryModel) -> NotConverg
     k = int(np.argmax(left[rows]))
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, "
-        f"{rate_description(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look "
-        f"whether the controller can change what it measures, its limits considered",
+        f"{rate_description(other, rates, [*rates][k])}, and nothing stops that. Give a better guess, or check "
+        "whether the controller can influence its measured quantity within its limits",
         own,
     )
 
@@ -670,8 +670,8 @@ def auxiliary_instant(
     other = auxiliary_model(model, {name: repr(z) for name, z in at.items()}, outputs, scales=scales)
     if has_switching_elements(other.model):
         raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and small motions know only one of the two; "
-            f"leave what holds out, m.changed({{...: None}}), or put joints in its place"
+            f"{model.name!r} has controllers and parts with modes (stops, friction, contacts), and linear analyses "
+            "support only one of the two; leave these parts out, m.changed({...: None}), or put joints in its place"
         )
     x = auxiliary_state(other, here, coordinates)
     off = np.zeros(len(x.v))
@@ -693,8 +693,8 @@ def _refuse_changing_states(other: AuxiliaryModel, x: MechanismState, off: np.nd
     name = [*rates][int(np.argmax(left))]
     raise AnalysisError(
         f"the controllers are not in equilibrium where the mechanism is: {rate_description(other, rates, name)}. Find "
-        f"an equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that "
-        f"has settled"
+        "an equilibrium first and linearise about it: about=m.equilibrium(); or linearise about the end of a motion "
+        "that has settled"
     )
 
 
@@ -745,8 +745,8 @@ def sampling_instants(
     for (period, _), part in zip(clocks, parts, strict=True):
         if abs(float(part) * least - period) > PERIOD_TOLERANCE * least:
             raise ModelError(
-                f"periods {least:g} s and {period:g} s of sampled controllers have no common multiple, so that there "
-                f"is no cycle from which to tell small motions; give one that is a simple multiple of the other"
+                f"periods {least:g} s and {period:g} s of sampled controllers have no common multiple, so that their "
+                "linear equations are not periodic; make one a simple multiple of the other"
             )
     whole = math.lcm(*(p.numerator for p in parts)) // math.gcd(*(p.denominator for p in parts))
     whole = next(n for n in (whole * k for k in range(1, MAX_INSTANTS)) if all((n / p).denominator == 1 for p in parts))
@@ -781,7 +781,7 @@ def refuse_unsettled(
         if not abs(next_one - held) <= SETTLED_TOLERANCE * max(size, abs(held)):
             raise ModelError(
                 f"{name!r} does not rest there: {s.name!r} is {held:.6g}, and {next_one:.6g} when it is sampled next; "
-                f"ask about an equilibrium, about=m.equilibrium(), or about the end of a motion that has settled"
+                "linearise about an equilibrium, about=m.equilibrium(), or about the end of a motion that has settled"
             )
 
 

@@ -72,8 +72,9 @@ def auxiliary_rest(
     other = auxiliary_model(model, {name: repr(z) for name, z in at.items()}, outputs, places=True, scales=scales)
     if has_switching_elements(other.model):
         raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "
-            f"leave what holds out, m.changed({{...: None}}), or simulate until it rests"
+            f"{model.name!r} has controllers and parts with modes (stops, friction, contacts), and equilibrium "
+            "supports only one of the two; leave these parts out, m.changed({...: None}), or simulate until it "
+            "rests"
         )
     b = auxiliary_state(other, x, "absolute")
     return other, RestState.at(b.c, b.t, b.q)
@@ -211,8 +212,8 @@ def determined_auxiliary_rest(
     if len(d) and not d[-1] > SINGULAR_STIFFNESS * d[0]:
         weak = in_user_terms(f.names[f.chosen_v[int(np.argmax(np.abs(Vt[-1])))]].name, other)
         raise SingularityError(
-            f"the equilibrium of {model.name!r} is not determined along {weak!r}: it may rest elsewhere too, so it has "
-            f"no derivatives; have a spring, a driver or a controller hold it there",
+            f"the equilibrium of {model.name!r} is not determined along {weak!r}: other positions are equilibria too, "
+            "so it has no derivatives; add a spring, a driver or a controller",
             at_rest.t,
             (weak,),
         )
@@ -246,17 +247,18 @@ class EquilibriumOptions(Options):
         super().__post_init__()
         if self.stable and self.turning:
             raise ModelError(
-                "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
-                "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
+                "stable=True follows decreasing potential energy from an unstable equilibrium, which a steady motion "
+                "does not have. Leave stable= out and start nearer to the wanted motion: by described positions, or "
+                "start="
             )
         if self.stable and self.preload:
             raise ModelError(
-                "preload= holds the mechanism where it is drawn, stable=True moves it elsewhere; give one of the two"
+                "preload= keeps the reference configuration, stable=True may leave it; give one of the two"
             )
         if self.preload and self.turning:
             raise ModelError(
-                "preload= holds a mechanism at rest, turning= asks for a motion; give one of the two. The effort of a "
-                "driver tells what a steady motion needs along its coordinate"
+                "preload= is for a mechanism at rest, turning= for a steady motion; give one of the two. The effort "
+                "of a driver is the force that a steady motion needs along its coordinate"
             )
 
 
@@ -307,7 +309,8 @@ def _refuse_with_contact(o: EquilibriumOptions) -> None:
     for name in ("preload", "turning", "stable"):
         if getattr(o, name):
             raise ModelError(
-                f"{name}= is for mechanisms without contact; with contact it comes to rest by itself. Leave it out"
+                f"{name}= is for mechanisms without contact; with contact the position of rest is found by a "
+                "motion. Leave it out"
             )
 
 
@@ -434,8 +437,8 @@ def preloaded_rest(a: Assembly, names: Sequence[str]) -> tuple[RestState, dict[s
     y = RestState.at(loaded, a.t, a.q)
     if not y.settled(PRELOAD_TOLERANCE):
         raise NotConverged(
-            f"{', '.join(names)} cannot balance {model.name!r} where it is drawn: {y.pushed()} all the same; preload "
-            f"other forces too",
+            f"{', '.join(names)} cannot balance {model.name!r} in the reference configuration: {y.pushed()} "
+            "nevertheless; preload other forces too",
             {n.name: float(-v) for n, v in zip(velocity_names(c.structure), y.equations.block("r"), strict=True)},
         )
     return y, dict(zip(names, w.tolist(), strict=True))

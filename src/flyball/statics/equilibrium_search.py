@@ -239,12 +239,12 @@ def search_failure(x: RestState) -> NotConverged:
     if jumps:
         return NotConverged(
             f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
-            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            "force is not balanced. Write a smooth law, for instance tanh(x/w) for sign(x)",
             residuals,
         )
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
-        f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
+        "nothing balances this. Give a better guess, or add a part that balances it: a spring, a stop, a driver",
         residuals,
     )
 
@@ -298,8 +298,8 @@ def _infinitesimal_mechanism_error(x: RestState, u: np.ndarray, w: np.ndarray) -
     shakes = velocity_names(x.c.structure)[int(np.argmax(np.abs(w)))].name
     return SingularityError(
         f"{x.c.structure.model.name!r} has no equilibrium at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
-        f"depend on each other there, so that it can shake along {shakes}, and no finite reaction carries the load "
-        f"along it. Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
+        f"are dependent there, so that it can shake along {shakes}, and no finite reaction carries the load along it. "
+        "Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
         x.t,
         names,
     )
@@ -396,8 +396,8 @@ def _velocity_of_coordinate(b: Assembly, name: str) -> int:
     row = coordinate_row(s, owner, what)
     if row is None:
         raise ModelError(
-            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate along the way from "
-            f"ground, one of {', '.join(n.name for n in velocity_names(s))}"
+            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate of a joint on the "
+            f"tree from ground, one of {', '.join(n.name for n in velocity_names(s))}"
         )
     return int(s.tables["tree"].v[row])
 
@@ -460,7 +460,9 @@ def _steady_failure(x: MechanismState, names: list[str]) -> NotConverged:
     s, e = x.c.structure, EquationDerivatives(x)
     left, known = e.block("r"), velocity_names(s)
     who = ", ".join(names)
-    begin = f"no steady motion of {s.model.name!r} was found in which {who} turn evenly and all else stands still"
+    begin = (
+        f"no steady motion of {s.model.name!r} was found in which {who} turn uniformly and all other parts are at rest"
+    )
     residuals = {n.name: float(-value) for n, value in zip(known, left, strict=True)}
     gaps, misses = _row_gaps(e), _rate_errors(e)
     if max(gaps.max(initial=0.0), misses.max(initial=0.0)) > STEADY_TOLERANCE:

@@ -103,12 +103,14 @@ def checked_values(
     given = t if parameter == "t" else (parameters or {}).get(parameter)
     if given is not None:
         where = "t" if parameter == "t" else "parameters"
-        raise ModelError(f"{parameter!r} goes through its values, so {where} cannot hold it at {given}; leave that out")
+        raise ModelError(f"{parameter!r} takes all its values, so {where} cannot fix it at {given}; leave that out")
     known = [*model.parameters, "t"]
     if parameter not in known:
         raise ModelError(f"{model.name!r} has no parameter {parameter!r}{suggest(parameter, known)}; {listing(known)}")
     if parameter != "t" and unused_parameters(model, [parameter]):
-        raise ModelError(f"nothing of {model.name!r} depends on {parameter!r}: all its values would give the same")
+        raise ModelError(
+            f"nothing of {model.name!r} depends on {parameter!r}: all its values give the same equilibrium"
+        )
     points = np.atleast_1d(np.asarray(values, float))
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all():
         raise ModelError(f"values of {parameter!r} must be finite numbers in SI units, one at least, got {values!r}")

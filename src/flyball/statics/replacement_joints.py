@@ -221,8 +221,8 @@ def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
     more = len(w.path) - 1
     points = "a point" if more == 1 else f"{more} points"
     raise ModelError(
-        f"{e.title} is taut, and runs over {points} between its ends: nothing here holds the sum of its parts. "
-        f"Give it a stiffness"
+        f"{e.title} is taut, and runs over {points} between its ends; this analysis has no constraint for the sum of "
+        "its lengths. Give it a stiffness"
     )
 
 

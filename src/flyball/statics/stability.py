@@ -164,7 +164,7 @@ class RestState:
             return self._solve(self.r, self.g, damping)
         except AnalysisError:
             if found := nonsmooth_points(self.equations):
-                raise nonsmooth_error(found, self.t, "where it rests is open") from None
+                raise nonsmooth_error(found, self.t, "its position of rest is not determined") from None
             raise
 
     def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -292,10 +292,10 @@ def one_sided_stability(
         If a force jumps, or stability does not follow from the sides.
     """
     if any(k.jump for k in found):
-        raise nonsmooth_error(found, x.t, "whether it is stable there is open")
+        raise nonsmooth_error(found, x.t, "its stability there is not determined")
     normals = _distinct_normals([k.along[0] * x.scale for k in found])
     if len(normals) > MAX_NONSMOOTH:
-        raise nonsmooth_error(found, x.t, f"of more than {MAX_NONSMOOTH} at once it is open whether it is stable there")
+        raise nonsmooth_error(found, x.t, f"of more than {MAX_NONSMOOTH} at once its stability is not determined")
     kinds, least = [], None
     for signs in itertools.product((1.0, -1.0), repeat=len(normals)):
         own = np.array(signs)[:, None] * normals
@@ -311,7 +311,7 @@ def one_sided_stability(
     assert least is not None
     kind = next((k for k in (UNSTABLE, "", MARGINAL) if k in kinds), STABLE)
     if not kind:
-        raise nonsmooth_error(found, x.t, "whether it is stable there is open")
+        raise nonsmooth_error(found, x.t, "its stability there is not determined")
     return kind, least
 
 

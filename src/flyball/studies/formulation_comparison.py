@@ -76,7 +76,7 @@ EXPLICIT_FORMULATIONS = {
     "projection-steps": FormulationChoice(
         "positions and velocities are projected after every step", "projection-steps"
     ),
-    "projection": FormulationChoice("positions and velocities are projected in every stage; the way of simulate"),
+    "projection": FormulationChoice("positions and velocities are projected in every stage, as in simulate"),
     "partitioning": FormulationChoice(
         "independent coordinates are integrated, the others solved for in every stage (Wehage and Haug 1982)",
         "partitioning",
@@ -89,14 +89,12 @@ EXPLICIT_FORMULATIONS = {
 """Formulations for explicit methods, all of which are compared unless some are named."""
 IMPLICIT_FORMULATIONS = {
     RADAU: FormulationChoice("Radau IIA of order 5, implicit, of the stabilised equations of index 2", method=RADAU),
-    f"{RADAU} index 3": FormulationChoice(
-        "the same with positions alone held to the constraints", "none", method=RADAU
-    ),
+    f"{RADAU} index 3": FormulationChoice("the same with projection of positions only", "none", method=RADAU),
     GENERALISED_ALPHA: FormulationChoice(
         "generalised-alpha, implicit, of order 2, of the stabilised equations of index 2", method=GENERALISED_ALPHA
     ),
     f"{GENERALISED_ALPHA} index 3": FormulationChoice(
-        "the same with positions alone held to the constraints", "none", method=GENERALISED_ALPHA
+        "the same with projection of positions only", "none", method=GENERALISED_ALPHA
     ),
     VARIATIONAL: FormulationChoice(
         "a variational integrator on Lie groups, of order 2: symplectic", method=VARIATIONAL
@@ -217,7 +215,7 @@ def _checked_names(names: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(EXPLICIT_FORMULATIONS)
     wanted = (names,) if isinstance(names, str) else tuple(names)
     if not wanted:
-        raise ModelError(f"formulations names none: nothing would be compared; {listing(list(FORMULATIONS))}")
+        raise ModelError(f"formulations is empty: nothing would be compared; {listing(list(FORMULATIONS))}")
     for name in wanted:
         if name not in FORMULATIONS:
             raise ModelError(
@@ -228,7 +226,7 @@ def _checked_names(names: Sequence[str] | None) -> tuple[str, ...]:
 
 def _reference(job: _ComparisonTask) -> tuple[Result | None, str]:
     """Reference motion by projection at the finest tolerance that succeeds, and its description."""
-    why = "the tolerances asked for are as fine"
+    why = "the requested tolerances are as small"
     usual = _integration(job, "projection")
     for rtol in REFERENCE_TOLERANCES:
         if rtol < usual.rtol:
@@ -236,7 +234,11 @@ def _reference(job: _ComparisonTask) -> tuple[Result | None, str]:
             if not why:
                 return result, f"projection at rtol = {rtol:g}"
     bent = ", ".join(e.title for e in nonsmooth_elements(job.model))
-    note = f" compare knows no corners of laws ({bent}), at which a motion may stick; simulate does" if bent else ""
+    note = (
+        f" compare does not support corners of laws ({bent}), at which a motion may stick; simulate does"
+        if bent
+        else ""
+    )
     return None, f"none: {why}{note}"
 
 

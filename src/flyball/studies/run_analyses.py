@@ -63,7 +63,7 @@ def study_quantities(
     if isinstance(of, Mapping):
         for title, function in of.items():
             if not isinstance(title, str) or not callable(function):
-                raise ModelError(f"of maps names to functions of a run's answer, not {title!r} to {function!r}")
+                raise ModelError(f"of maps names to functions of a run's result, not {title!r} to {function!r}")
         return tuple(StudyQuantity(title, FUNCTION, title, "", function) for title, function in of.items())
     if isinstance(of, (str, bytes)) or not isinstance(of, Sequence) or not all(isinstance(x, str) for x in of):
         raise ModelError(f"of is a list of names, for instance of=['max(slider.x)'], not {of!r}")
@@ -251,7 +251,7 @@ class FunctionAnalysis(RunAnalysis):
     def named(self, model: Model, text: Any) -> StudyQuantity:
         """Refuse names: quantities of a user's function must be functions."""
         raise ModelError(
-            f"of={text!r}: names say nothing of what a function of your own returns; give of={{'name': function of it}}"
+            f"of={text!r}: the results of a function of your own have no names; give of={{'name': function of it}}"
         )
 
 
@@ -289,8 +289,8 @@ class InstantAnalysis(RunAnalysis):
         """Refuse switching elements, whose state depends on a motion."""
         if parts := list(unsupported_elements(model)):
             raise ModelError(
-                f"{model.name!r} has {', '.join(e.title for e in parts)}, and analysis='instant' does not know what "
-                f"holds at times; analysis='motion' does"
+                f"{model.name!r} has {', '.join(e.title for e in parts)}, and analysis='instant' does not support "
+                "parts with modes; analysis='motion' does"
             )
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:

@@ -510,14 +510,16 @@ def _compute_missing(question: RunSpecification, found: Study, o: StudyOptions, 
                     save_study(found, o.file)
                     saved = time.monotonic()
     except KeyboardInterrupt:
-        found.message = "interrupted by the user; what was computed is kept"
+        found.message = "interrupted by the user; the completed runs are kept"
     except FlyballError:
         raise
     except Exception as error:
         if o.file is not None:
             save_study(found, o.file)
-        kept = f"; what was done is in {o.file}, and the same call goes on from it" if o.file is not None else ""
-        raise AnalysisError(f"the study cannot go on ({type(error).__name__}: {error}){kept}") from error
+        kept = (
+            f"; the completed runs are in {o.file}, and the same call continues from it" if o.file is not None else ""
+        )
+        raise AnalysisError(f"the study cannot continue ({type(error).__name__}: {error}){kept}") from error
     else:
         found.message = ""
 

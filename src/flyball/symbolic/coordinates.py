@@ -50,7 +50,7 @@ def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wis
     if not _is_regular(compile_mechanism(model, parameters=parameters, tree=tree), wish):
         return _engine_choice(model, parameters, wish)
     if wish == "absolute":
-        return CoordinateChoice((), "absolute: as asked for")
+        return CoordinateChoice((), "absolute: as requested")
     if not tree:
         return CoordinateChoice((), "absolute: no joint can be a tree joint")
     return CoordinateChoice(tree, _description(model, wish, tree))
@@ -58,9 +58,9 @@ def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wis
 
 def _description(model: Model, wish: str, tree: Sequence[str]) -> str:
     cut = [j.name for j in model.joints if j.name not in tree]
-    more = f"; rows remain for {', '.join(cut[:8])}" if cut else ""
+    more = f"; loops are cut at {', '.join(cut[:8])}" if cut else ""
     more += f" and {len(cut) - 8} more" if len(cut) > 8 else ""
-    return f"joint: {'as asked for' if wish == 'joint' else 'these make the fewest equations'}{more}"
+    return f"joint: {'as requested' if wish == 'joint' else 'these make the fewest equations'}{more}"
 
 
 def _is_regular(c: CompiledMechanism, wish: str) -> bool:

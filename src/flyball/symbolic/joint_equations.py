@@ -210,7 +210,7 @@ class JointEquations(SymbolTable):
 
     def _relation(self, f: str) -> Expressions:
         if self.orientation != "bryant":
-            raise ModelError("H relates Bryant angles to angular velocities: ask with orientation='bryant'")
+            raise ModelError("H relates Bryant angles to angular velocities: give orientation='bryant'")
         H = np.array(axes_in_base(0, 1, 2, self._symbols[f"{f}.b1"], self._symbols[f"{f}.b2"]), object).T
         return Expressions(self, H, [f"{f}.w{a}" for a in AXES], [f"{f}.b{k}'" for k in (1, 2, 3)])
 

@@ -130,7 +130,7 @@ def _pair_properties(scene: ContactTables, i: int, j: int) -> np.ndarray | None:
 def _unsupported_surface(surfaces: Surfaces, row: np.ndarray, shapes: tuple[int, int]) -> str:
     """Surface properties that rows cannot express."""
     if row[su.STIFFNESS] > 0.0 or row[su.MODULUS] > 0.0:
-        return "{a} and {b} give way by a law of the overlap"
+        return "the contact of {a} and {b} is compliant"
     if row[su.ROLLING] > 0.0 or row[su.SPINNING] > 0.0:
         return "{a} on {b} has rolling or spinning friction"
     if row[su.ACROSS] != 1.0:

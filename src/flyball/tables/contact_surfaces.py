@@ -72,8 +72,8 @@ def contact_groups(model: Model, owners: Iterable[Owner]) -> ContactGroups:
     number = {s: k for k, s in enumerate(dict.fromkeys(signature.values()))}
     if len(number) > MAX_GROUPS:
         raise ModelError(
-            f"the contacts of {model.name!r} tell {len(number)} groups of bodies apart; {MAX_GROUPS} are possible. "
-            f"Name fewer bodies in between=, others= and exclude=, and give them materials where only friction differs"
+            f"the contacts of {model.name!r} distinguish {len(number)} groups of bodies; {MAX_GROUPS} are possible. "
+            "Name fewer bodies in between=, others= and exclude=, and give them materials where only friction differs"
         )
     holds = {}
     for s, a in number.items():
@@ -179,7 +179,7 @@ def add_compliance(row: np.ndarray, who: tuple, sources: Sequence[Any], material
             else "that follows only from youngs_modulus and poissons_ratio of both materials"
         )
         raise ModelError(
-            f"{who[0].title}: law={n.law!r} says no stiffness of {who[3]}, and {why}; give stiffness=... "
+            f"{who[0].title}: law={n.law!r} does not define the stiffness of {who[3]}, and {why}; give stiffness=... "
             f"[N/m^{exponent:g}]"
         )
     give = sum((1.0 - np.real(x.poissons_ratio) ** 2) / np.real(x.youngs_modulus) for x in known)
@@ -200,7 +200,7 @@ def check_curvature(G: ct.Geometry, pair: np.ndarray, materials: Sequence[str], 
         if planar or balls not in (of[a], of[b]) or not of[a] | of[b] <= {*balls, *FLAT_KINDS}:
             raise ModelError(
                 f"contact of {materials[a]!r} and {materials[b]!r}: its stiffness follows from youngs_modulus only "
-                f"for spheres on spheres or on flat shapes, in space; say stiffness=... for others"
+                "for spheres on spheres or on flat shapes, in space; give stiffness=... for others"
             )
 
 
@@ -271,13 +271,13 @@ def _friction(row: np.ndarray, who: tuple, sources: Sequence[Any], materials: Se
     found = _from_both("friction", sources[2], materials)
     if found is None:
         raise ModelError(
-            f"{who[0].title}: nothing says the friction of {who[3]}; give the contact friction=... (0 is smooth), or "
-            f"one of them a material that says it"
+            f"{who[0].title}: the friction of {who[3]} is not given; give the contact friction=... (0 is smooth), or "
+            "one of them a material with friction"
         )
     if all(isinstance(x.friction, tuple) for x in materials):
         raise ModelError(
-            f"{who[0].title}: materials {who[1]!r} and {who[2]!r} both have a grain, and no law says what their "
-            f"friction is; say it by MaterialPair({who[1]!r}, {who[2]!r}, friction=...)"
+            f"{who[0].title}: materials {who[1]!r} and {who[2]!r} both have a grain, and no rule combines their "
+            f"friction; give it by MaterialPair({who[1]!r}, {who[2]!r}, friction=...)"
         )
     along, across = (np.sqrt(np.prod([np.real(friction_pair(x.friction)[k]) for x in found])) for k in (0, 1))
     row[su.STATIC] = np.sqrt(np.prod([np.real(_static_friction(x)) for x in found]))

@@ -157,8 +157,8 @@ def _refuse_names(cls: type[Force]) -> None:
         taken &= {*dir(CoordinateForce), "load"} - set(CoordinateForce.__dataclass_fields__)
         if taken or "load" in vars(c):
             raise ModelError(
-                f"{c.__name__}: {', '.join(sorted(taken or {'load'}))} has a meaning for every force; give the field "
-                f"another name"
+                f"{c.__name__}: {', '.join(sorted(taken or {'load'}))} is reserved for every force; give the field "
+                "another name"
             )
 
 

@@ -92,7 +92,7 @@ def _row_bodies(s: Structure, paths: list[tuple[list[int], list[int]]]) -> list[
             touched[k] |= touched[len(s.rows) + m]
         # a row between two bodies that the forest connects rigidly is redundant
         if not touched[k] and not s.tree_joints:
-            raise ModelError(f"{r.element.title} restrains nothing that can move")
+            raise ModelError(f"{r.element.title} constrains no body that can move")
     return touched
 
 

@@ -115,7 +115,7 @@ def record_motion(
     derived from their joints and inertia.
     """
     if not len(result.t):
-        raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
+        raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to plot")
     motion = result
     result, every, near, instead = motion_to_show(motion)
     members = sum(map(len, result.bulk.values()))

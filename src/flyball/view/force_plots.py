@@ -153,7 +153,7 @@ def _undetermined_note(curves: dict[str, tuple[str, np.ndarray]]) -> str:
         return ""
     told = "; ".join(f"{joint} {', '.join(what)}" for joint, what in list(free.items())[:MAX_NAMED_JOINTS])
     more = f"; and {len(free) - MAX_NAMED_JOINTS} more joints" if len(free) > MAX_NAMED_JOINTS else ""
-    return "\n".join(wrap(f"undetermined by redundancy, not drawn: {told}{more}", NOTE_WIDTH))
+    return "\n".join(wrap(f"undetermined because of redundancy, not plotted: {told}{more}", NOTE_WIDTH))
 
 
 def _force_scale(found: InverseDynamics) -> float:

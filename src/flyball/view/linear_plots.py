@@ -199,7 +199,7 @@ def _frequency_axes(upper: Axes, lower: Axes, w: np.ndarray, angles: Sequence[np
     above.set_xlabel("frequency [Hz]")
     upper.spines["top"].set_visible(True)
     if not len(finite):
-        upper.set_title("no answer: the output does not follow the input")
+        upper.set_title("no response: the output does not depend on the input")
     lower.set_xlabel("angular frequency [rad/s]")
     lower.set_ylabel("phase [deg]")
     low, high = (finite.min(), finite.max()) if len(finite) else (-180.0, 0.0)
@@ -285,7 +285,7 @@ def _limit_to_branches(ax: Axes, roots: np.ndarray) -> None:
     usual = max(usual, 1.3 * float(ends[0].max(initial=0.0)) if len(ends) else 0.0)
     near = every[np.abs(every) <= usual] if every.size else np.zeros(1, complex)
     if len(near) < len(every):
-        ax.set_title("branches that leave the picture go on")
+        ax.set_title("branches continue outside the plot")
     limits_around(ax, near)
 
 

@@ -64,7 +64,7 @@ def plot_path(
     if arrows is not None and arrows not in ARROW_UNITS:
         raise ModelError(f"arrows must be 'velocity', 'acceleration' or None, not {arrows!r}")
     if not len(result.t):
-        raise ModelError(f"the result of {result.model.name!r} has no times: there is nothing to draw")
+        raise ModelError(f"the result of {result.model.name!r} has no times: there is nothing to plot")
     tracks = {name: record for p in points or _default_points(result) for name, record in [_point_motion(result, p)]}
     links = _mechanism_positions(result, points, positions)
     with plot_style():

@@ -300,7 +300,7 @@ SHOW_OPTIONS = {
     "elements": "forces of springs, motors and drivers",
     "loads": "given forces",
     "contacts": "contact forces",
-    "moments": "moments beside forces, wherever those are shown",
+    "moments": "moments, where forces are shown",
     "world": "axes of the world",
     "bodies": "axes of bodies",
     "frames": "axes of joints and named frames",

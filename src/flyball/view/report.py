@@ -270,7 +270,7 @@ def joints(result: Result) -> ReportTable:
     loads = ("largest |force| [N]", "largest |torque| [N m]")
     if not any(r[-1] for r in rows):
         return ReportTable("joints", "Joints", (*columns, *loads), tuple(r[:-1] for r in rows))
-    note = "Redundancy leaves the named components undetermined; of those one choice is given."
+    note = "The named components are undetermined because of redundancy; one of their solutions is shown."
     return ReportTable("joints", "Joints", (*columns, *loads, "not determined"), tuple(rows), note=note)
 
 

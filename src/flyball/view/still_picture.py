@@ -187,7 +187,7 @@ def still_svg(recording: Recording) -> str:
 
     back_to_front = sorted(drawn, key=lambda s: (bool(s.pin) and recording.planar, round(s.depth, 9)))
     body = "".join(_stroke_svg(s, placed(s.points)) for s in back_to_front)
-    title = escape(f"{recording.name} as drawn")
+    title = escape(f"{recording.name} in the reference configuration")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" '
         f'width="{PICTURE_WIDTH:g}" '

@@ -278,7 +278,7 @@ def _scalar_names(found: Study, of: Sequence[str]) -> list[str]:
     curves = [name for name in names if found.values[name].ndim > 1]
     if curves or not names:
         name = (curves or list(found.of))[0]
-        raise ModelError(f"{name} is a curve; ask for end({name}), or max, min, mean, rms of it")
+        raise ModelError(f"{name} is a curve; give end({name}), or max, min, mean, rms of it")
     return names
 
 

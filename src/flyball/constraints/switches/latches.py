@@ -107,13 +107,13 @@ def _move_freely(n: Instant, s: int) -> None:
 
 
 ONE_WAY = OneWayLatch(
-    guards=(G_BACK, G_PULL), forces=ONE_SIDED, role="goes one way only", closing=("lock", "locks"),
+    guards=(G_BACK, G_PULL), forces=ONE_SIDED, role="turns in one direction only", closing=("lock", "locks"),
     opening=("overrun", "overruns"), states=("holds", "overruns"),
 )  # fmt: skip
 """A freewheel, a check valve."""
 RATCHET = RatchetLatch(
     guards=(G_LOWER, G_REVERSES, G_PULL), forces=ONE_SIDED, bounded=True, numbers=("tooth", "pitch", "restitution"),
     role="is latched", closing=("latch", "latches"), opening=("unlatch", "lets go"), states=("holds", "free"),
-    misplaced="it is held where no tooth is",
+    misplaced="it is locked between teeth",
 )  # fmt: skip
 """A ratchet and its pawl."""

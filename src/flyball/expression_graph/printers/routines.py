@@ -214,8 +214,8 @@ def refuse_python_functions(routines: Sequence[Routine], language: str) -> None:
                 of = f.told.get("of")
                 raise ModelError(
                     f"{of + ': ' if of else ''}{f.name!r} is a Python function, and {r.name} calls it: {language} "
-                    "knows what is an expression or a table only. Write the law as an expression, give a table of "
-                    "points in its place, or export to Python, where functions are handed over"
+                    "supports expressions and tables only. Write the law as an expression, give a table of points in "
+                    "its place, or export to Python, where functions are passed as arguments"
                 )
 
 

@@ -102,7 +102,7 @@ class SympyReader:
         if x.name in self.named:
             return self.named[x.name]
         if x not in self.printer.symbols:
-            raise ModelError(f"the symbol {x} is not known: say what it stands for, symbols={{{x.name!r}: ...}}")
+            raise ModelError(f"the symbol {x} is not known: give its meaning, symbols={{{x.name!r}: ...}}")
         found = self.printer.symbols[x]
         return found if found.graph is self.graph else self.graph.rebuilt(found, ())
 
@@ -164,7 +164,7 @@ def choose_by_relation(relation: str, less: Any, a: Any, b: Any) -> Any:
         return scalar.choose(-less, b, a)
     if relation == "LessThan":
         return scalar.choose(less, b, a)
-    raise ModelError(f"a case that asks for {relation} has no counterpart here: use >, <, >= or <=")
+    raise ModelError(f"a case with the relation {relation} is not supported: use >, <, >= or <=")
 
 
 def sum_of(args: Sequence[Any]) -> Any:

@@ -169,7 +169,7 @@ def _used(v: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 ALIGNMENT_TOLERANCE = 1e-9  # sine of the angle between directions that count as equal
 OBLIQUE_REMEDY = (
-    "it stands oblique to the plane of the mechanism, so it has no outline that contact knows; turn it, or give it "
+    "it is oblique to the plane of the mechanism, so contact detection has no outline for it; turn it, or give it "
     "contact=False"
 )
 
@@ -281,8 +281,8 @@ def surface_defects(v: np.ndarray, f: np.ndarray) -> str:
         )
     if twisted:
         return (
-            f"its triangles do not all face outwards: at {twisted} edges two neighbours go round in different ways. "
-            f"Make its normals consistent in the program that made it"
+            f"its triangles do not all face outwards: at {twisted} edges two neighbours are oriented differently. "
+            "Make its normals consistent in the program that made it"
         )
     return _inside_out(v, f)
 
@@ -317,7 +317,7 @@ def _inside_out(v: np.ndarray, f: np.ndarray) -> str:
     for k in np.flatnonzero(volumes < 0):
         if not ((volumes > 0) & (low <= low[k]).all(axis=1) & (high >= high[k]).all(axis=1)).any():
             return (
-                f"triangles of it face inwards (the volume of a part comes out as {volumes[k]:.3g}). Turn "
-                f"these faces round (flip normals) in the program that made it"
+                f"triangles of it face inwards (the volume of a part is {volumes[k]:.3g}). Flip the normals of these "
+                "faces in the program that made it"
             )
     return ""

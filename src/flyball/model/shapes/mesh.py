@@ -240,8 +240,8 @@ class Mesh(Solid):
     def _closed(self, surface: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         if flaw := self.triangulation.flaws:
             raise ModelError(
-                f"{self.title}: it cannot touch anything, since {flaw}. Close it, or give it contact=False and a "
-                f"simpler shape beside it"
+                f"{self.title}: it cannot touch anything, since {flaw}. Close it, or give it contact=False and add a "
+                "simpler shape for contact"
             )
         return surface
 

@@ -34,7 +34,7 @@ MAX_PARAMETERS = 7  # largest number of parameters of a convex solid
 DIRECTIONS = tuple(d for d in itertools.product((-1.0, 0.0, 0.6, 1.0), repeat=3) if any(d))
 """Directions in which a support function is tested: along axes, in their planes, and others."""
 CONTACT_REMEDY = (
-    "give it contact=False, and the body shapes that can stand for it, such as Cylinder(..., looks=True, contact=True)"
+    "give it contact=False, and the body simpler shapes in its place, such as Cylinder(..., looks=True, contact=True)"
 )
 
 
@@ -124,7 +124,7 @@ class Solid(Element):
         ModelError
             If it has none.
         """
-        raise ModelError(f"{self.title}: {type(self).__name__} has no form that contact knows; {CONTACT_REMEDY}")
+        raise ModelError(f"{self.title}: {type(self).__name__} is not supported by contact detection; {CONTACT_REMEDY}")
 
     def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Return its planar contact geometry: convex parts of its outline, seen along z.
@@ -136,7 +136,7 @@ class Solid(Element):
         ModelError
             If it has none.
         """
-        raise ModelError(f"{self.title}: {type(self).__name__} has no outline that contact knows; {CONTACT_REMEDY}")
+        raise ModelError(f"{self.title}: {type(self).__name__} has no outline for contact detection; {CONTACT_REMEDY}")
 
     def volume(self, n: SimpleNamespace) -> Any:
         """Volume [m^3]."""

@@ -57,7 +57,7 @@ def lemke(M: np.ndarray, q: np.ndarray, pivots: int = 0) -> np.ndarray:
         column = T[:, enter]
         rows = np.flatnonzero(column > PIVOT_TOLERANCE * max(1.0, abs(column).max()))
         if not rows.size:
-            raise AnalysisError("pivoting ended on a ray: no impulses fulfil all conditions of these contacts")
+            raise AnalysisError("pivoting ended on a ray: no impulses satisfy all conditions of these contacts")
         held = np.flatnonzero(basis[rows] == 2 * n)
         ratios = T[rows, -1] / column[rows]
         if held.size and ratios[held[0]] <= ratios.min() * (1 + 1e-12) + 1e-300:

@@ -53,4 +53,4 @@ def view_of(result: Result, element: Any) -> PartView:
     for kind, cls in VIEWS:
         if isinstance(element, kind):
             return cls(result, element)
-    raise ModelError(f"a result says nothing of {element.title}: it is part of the description only")
+    raise ModelError(f"a result has no data of {element.title}, which is part of the description only")

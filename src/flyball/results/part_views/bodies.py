@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class FrameView(PartView):
     """Motion of a frame: a body's reference frame or a named one."""
 
-    instead: ClassVar = {"angle": "what moves in space has no single angle: use rotation or quaternion"}
+    instead: ClassVar = {"angle": "a body in space has no single angle: use rotation or quaternion"}
 
     def __init__(self, result: Result, element: Body | Frame) -> None:
         super().__init__(result, element)

@@ -129,7 +129,7 @@ class ForceView(PartView):
             except Exception as error:  # a user's function may raise anything
                 raise AnalysisError(
                     f"{self.element.title}: its law raises {type(error).__name__} at t = {t[i]:.6g} s: {error}. A law "
-                    f"must give the same number whenever it is asked; give a function without a memory"
+                    "must give the same number for the same arguments; give a function without memory"
                 ) from error
         return out
 

@@ -121,7 +121,7 @@ class JointView(PartView):
         if axes not in names:
             known = ["world", "joint", *names]
             hint = suggest(str(axes), known)
-            raise ModelError(f"{self.element.title} knows no axes {axes!r}{hint}; {listing(known)}")
+            raise ModelError(f"{self.element.title} has no axes {axes!r}{hint}; {listing(known)}")
         return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     @property

@@ -252,8 +252,8 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
         x = W.sensed[VALUE, S.switches.measured[k]]
         if held.joint and abs(x) > CLOSED_TOLERANCE * here.c.values.length:
             raise SimulationError(
-                f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and holds again only where "
-                f"its bodies meet; let the event be where they do",
+                f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and can lock again only "
+                "where its bodies meet; choose a condition of the event that holds there",
                 t=here.t,
             )
         if W.modes.mode[k] == OFF:

@@ -151,16 +151,16 @@ def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
     )
     if not moved.max() <= PLACE_TOLERANCE * here.c.values.length:
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put what touches at {had[int(moved.argmax())].title} elsewhere in no "
-            f"time, by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
+            f"at t = {here.t:.9g} s {who} would move the contact of {had[int(moved.argmax())].title} instantaneously, "
+            f"by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
             t=here.t,
         )
     for a, b in zip(had, has, strict=True):
         if (a.friction, a.restitution) != (b.friction, b.restitution):
             raise SimulationError(
-                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which a motion that "
-                f"is integrated takes as they are at its start; let one motion end there (fb.Stop), and go on from it "
-                f"with the other value: simulate(start=run, parameters=...)",
+                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which are constant "
+                "during an event-driven motion; end one motion there (fb.Stop), and continue it with the other "
+                "value: simulate(start=run, parameters=...)",
                 t=here.t,
             )
 
@@ -181,9 +181,9 @@ def _refuse_violated_bounds(here: EventContext, who: str) -> None:
         bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
         said = spec.switch.kind.misplaced or violated_rule(spec, float(x), bounds, unit)
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
-            f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "
-            f"is fixed to",
+            f"at t = {here.t:.9g} s {who} would put {spec.element.title} instantaneously, by {past[k]:.3g} {unit}: "
+            f"{said}. Set it where the coordinate is within it, give it stiffness=..., or let a Driver move what it "
+            "is fixed to",
             t=here.t,
         )
 
@@ -228,8 +228,8 @@ def _refuse_moved_bodies(here: EventContext, who: str, before: BodyPlaces, after
     worst = max(off, key=lambda name: off[name] if np.isfinite(off[name]) else np.inf)
     if not off[worst] <= PLACE_TOLERANCE:
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would put {worst} elsewhere in no time, by {off[worst] * size:.3g}: a "
-            f"parameter that is set may change forces, laws and masses, not where things are. Let a Driver move it",
+            f"at t = {here.t:.9g} s {who} would put {worst} instantaneously, by {off[worst] * size:.3g}: setting a "
+            "parameter may change forces, laws and masses, but not positions. Let a Driver move it",
             t=here.t,
         )
     worst = max(fast, key=lambda name: fast[name] if np.isfinite(fast[name]) else np.inf)
@@ -431,7 +431,8 @@ def report_missed_events(here: EventContext) -> None:
     for e in here.structure.model.events:
         if e.name in here.true and not here.counts.get(e.name):
             here.doubts.append(
-                f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
+                f"{e.title} never happened: {e.when!r} was true from the start, and the event occurs when it "
+                "becomes true"
             )
 
 
@@ -493,7 +494,7 @@ def refuse_contradictions(here: EventContext, every: Sequence[tuple[Event, Actio
             if first is not e and a != other:
                 raise SimulationError(
                     f"at t = {here.t:.9g} s actions contradict each other: {other.title} of {first.title} and "
-                    f"{a.title} of {e.title}; let one of the events come later, or once (times=1)",
+                    f"{a.title} of {e.title}; let one of the events happen later, or once (times=1)",
                     t=here.t,
                 )
 
@@ -542,7 +543,7 @@ def _do_impulse(here: EventContext, found: EventActionList) -> ActionReports:
         along = (_unit_of_argument(here, e, a, "impulse") or "N*s").replace("*", " ")
         told = [f"{_vector_text(x[:n])} {along}"] if n else []
         told += [f"{_vector_text(x[n:])} N m s"] if x[n:] else []
-        out.append((e, f"struck {a.on}: {', '.join(told)}"))
+        out.append((e, f"impulse on {a.on}: {', '.join(told)}"))
     return out
 
 
@@ -557,7 +558,7 @@ def _do_note(here: EventContext, found: EventActionList) -> ActionReports:
 def _do_stop(here: EventContext, found: EventActionList) -> ActionReports:
     names = " and ".join(repr(e.name) for e, _, _ in found)
     asked = here.start.base.t + here.clock.real.span
-    here.stopped = f"ended at {here.t:.6g} s by event {names} (asked: {asked:.6g} s)"
+    here.stopped = f"ended at {here.t:.6g} s by event {names} (requested: {asked:.6g} s)"
     return [(e, "ended the motion") for e, _, _ in found]
 
 

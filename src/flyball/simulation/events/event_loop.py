@@ -149,11 +149,11 @@ def guard_check_remark(loop: GuardedLoop) -> str:
     """Return the health remark on the number of points at which guards were evaluated."""
     count = loop.desk.count
     guards, steps = len(loop.desk.way), max(int(count.steps), 1)
-    what = "1 guard" if guards == 1 else f"{guards} guards"
+    what = "1 event function" if guards == 1 else f"{guards} event functions"
     most = max(count.looks / steps + 1, CHECKS_PER_STEP)  # plus the end of the step
     return (
-        f"{what} at {most:.0f} places a step on average, {CHECKS_PER_STEP} at least: what passes zero and comes "
-        f"back between two of them is not seen"
+        f"{what} evaluated at about {most:.0f} points per step (at least {CHECKS_PER_STEP}): a function that crosses "
+        "zero twice between two points can be missed; a smaller max_step reduces that risk"
     )
 
 
@@ -450,12 +450,12 @@ class EventDrivenMotion:
         implicit, corner = self.now in IMPLICIT_METHODS, slides_on_corner(c)
         if implicit and corner:
             pace.back = self.now
-            self.turn(EXPLICIT_METHOD, "where a law is held on its corner")
+            self.turn(EXPLICIT_METHOD, "while the motion stays on the corner of a law")
         elif pace.back and not corner:
             to, pace.back = pace.back, ""
             self.turn(to, "where none is any more")
         elif implicit and pace.mixed and clock.count.status in FAILED_STATUS:
-            self.turn(EXPLICIT_METHOD, f"where {self.now} could not go on")
+            self.turn(EXPLICIT_METHOD, f"where {self.now} could not continue")
             pace.stays()
         elif pace.asked and clock.count.status in (ex.RUNNING, EVENT_FOUND):
             self.turn(pace.asked, BECAUSE_STIFF if pace.asked in IMPLICIT_METHODS else BECAUSE_JUMPED)

@@ -77,7 +77,7 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
     else:
         rule = "not be negative" if n.kinds[s].forces == ONE_SIDED else "be zero"
         said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must {rule}"
-    return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")
+    return ModelError(f"{e.title}: the motion starts beyond it: {said}; change the start or the limit")
 
 
 def passed_bound(n: InstantProblem, s: int, past: float) -> UnresolvedInstant:
@@ -104,7 +104,7 @@ def endless_events(n: InstantProblem, recent: Iterable[Sequence[int]], many: int
 def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) -> UnresolvedInstant:
     """Return the error for events of one guard, ``many`` so far, that accumulate at the time ``end``."""
     return UnresolvedInstant(
-        f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times, ever sooner after the last, "
+        f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times at decreasing intervals, "
         f"without end before t = {end:.6g} s",
         t=n.here.t,
     )
@@ -113,8 +113,9 @@ def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) ->
 def no_admissible_impulses(n: InstantProblem, parts: list[ProblemRow]) -> UnresolvedInstant:
     """Return the error for impulse equations without solution."""
     return UnresolvedInstant(
-        f"at t = {n.here.t:.9g} s no impulses let the velocities fulfil all that is asked of them at once; it is asked "
-        f"by {rows_in_words(n, parts)}. Where a driver moves what a stop or a lock holds, one of them must give way",
+        f"at t = {n.here.t:.9g} s no impulses satisfy all constraints on the velocities at once: those of "
+        f"{rows_in_words(n, parts)}. If a driver moves a coordinate that a stop or a lock fixes, make one of them "
+        "compliant, or leave it out",
         t=n.here.t,
     )
 
@@ -126,18 +127,17 @@ def no_admissible_forces(n: InstantProblem, found: ModeDecision) -> UnresolvedIn
     if found.ended != HOLD_IMPOSSIBLE and len(jammed) == 1 and hasattr(jammed[0], "joint"):
         return UnresolvedInstant(jam_message(jammed[0], n.here.t, True), t=n.here.t)
     if found.ended == HOLD_IMPOSSIBLE or not sliding:
-        why = "what they hold cannot be held together: one of them must give way"
+        why = "their constraints contradict each other: make one of them compliant, or leave it out"
     else:
         why = (
-            f"no loads were found that go with the friction of {' and '.join(element_titles(n, sliding))}. "
-            "Either it grows "
-            "with the load that it makes itself faster than that can hold it (a jam, or Painleve's paradox): with less "
-            "friction, or an elastic stop or joint, there is a solution. Or there is one, and the search ended short "
-            "of it"
+            "no loads were found that are consistent with the friction of "
+            f"{' and '.join(element_titles(n, sliding))}. Either there are none, since friction increases its own "
+            "load too much (a jam, or Painleve's paradox): with less friction, or an elastic stop or joint, there is "
+            "a solution. Or the search did not find them"
         )
     return UnresolvedInstant(
-        f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "
-        f"{rows_in_words(n, found.parts)}; {why}",
+        f"at t = {n.here.t:.9g} s no forces satisfy all conditions at once: those of {rows_in_words(n, found.parts)}; "
+        f"{why}",
         t=n.here.t,
     )
 
@@ -146,7 +146,7 @@ def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstan
     """Return the error for an instant that cannot be resolved in a finite number of rounds."""
     return UnresolvedInstant(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
-        f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
+        f"{', '.join(dict.fromkeys(names))}; each reverses the other",
         t=t,
     )
 
@@ -215,7 +215,7 @@ def record_mode_changes(
         elif (
             not was and not now and _slides_either_way(n, s) and ways[s] * n.ways()[s] < 0.0 and n.ways()[s] != BY_RATE
         ):
-            told.setdefault("turn", []).append((s, "slides the other way"))
+            told.setdefault("turn", []).append((s, "slides in the other direction"))
     for kind, all_of in told.items():
         names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
         append_record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)

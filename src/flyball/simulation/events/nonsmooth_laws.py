@@ -437,10 +437,10 @@ class Corners:
             higher = any(not found.B[found.which.index(s)].any() for s in back)
             why = "of which one is a rate of another" if higher else "none of whose sides the motion stays on"
             raise SimulationError(
-                f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet where their "
-                f"laws push back from every side: how the motion goes on along several such corners, {why}, is not "
-                f"known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x), or let a Brake, Clutch "
-                f"or JointFriction be the friction",
+                f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet, and the "
+                f"motion is attracted to them from all sides. Motion along several corners, {why}, is not supported; "
+                "make one of them smooth: max(-1, min(1, x / width)) for sign(x), or let a Brake, Clutch or "
+                "JointFriction be the friction",
                 t=t,
             )
 

@@ -102,9 +102,9 @@ def report_distribution(n: InstantProblem, guards: Sequence[int]) -> None:
         dict.fromkeys(f"{e.title} of {body_names(e)}" if isinstance(e, Touch) else e.title for e in which)
     )
     said = (
-        f"{who} would carry more than can be held there by the least forces, by others it holds: how rigid bodies at "
-        f"rest share what holds them is not determined, and when this gives way can be wrong. Steps by impulses "
-        f"(method='impulse') share anew in each step"
+        f"{who} would slip with the forces of least sum of squares, and sticks with others: rigid bodies at rest do "
+        "not determine how contacts share their load, so the time of slipping can be wrong. Impulse time stepping "
+        "(method='impulse') chooses the forces anew in each step"
     )
     if said not in n.here.doubts:
         n.here.doubts.append(said)
@@ -121,8 +121,8 @@ def _several_solutions(n: InstantProblem, found: ModeDecision) -> str:
         if n.again(P) == SOLUTION_FOUND and np.abs(P.u - found.u).max() > DIFFERENT_SOLUTION * size:
             who = " and ".join(element_titles(n, found.parts))
             return (
-                f"rigid bodies with friction can go on in several ways (Painleve's paradox) at "
-                f"{who}; taken: the one that goes on from the modes before"
+                f"rigid bodies with friction have several solutions (Painleve's paradox) at {who}; the one that "
+                "continues the previous modes is used"
             )
     return ""
 
@@ -146,8 +146,8 @@ def _undetermined_friction(n: InstantProblem, found: ModeDecision) -> str:
         return ""
     who = " and ".join(element_titles(n, [found.parts[i] for i in open_]))
     return (
-        f"whether {who} holds is not determined: the most that it holds follows reactions that redundancy leaves open; "
-        f"taken: those whose sum of squares, each by the mass that it moves, is least"
+        f"whether {who} sticks is not determined: its limit depends on reactions that redundancy leaves undetermined; "
+        "those with the least sum of squares, weighted by the mass that each moves, are used"
     )
 
 

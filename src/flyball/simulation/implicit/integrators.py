@@ -131,7 +131,10 @@ class ImplicitIntegrator:
         why = (
             f"the equations of a step of {step:g} s have no solution that Newton's method finds"
             if self.clock.count.step_status != 0
-            else f"what happens within a step of {step:g} s cannot be told: between its ends it is too far off"
+            else (
+                f"what happens within a step of {step:g} s cannot be resolved: the interpolation within it is too "
+                "inaccurate"
+            )
         )
         if steep := self._steep_laws():
             why += f" (the slope of {' and of '.join(steep)} may be infinite there)"
@@ -280,8 +283,8 @@ def refuse_for_variational(start: InitialState) -> None:
     rolling = dict.fromkeys(r.element.title for r in s.rows if not r.holonomic)
     if rolling:
         raise ModelError(
-            f"method={VARIATIONAL!r} does not know rows that restrain velocities alone ({', '.join(rolling)}); leave "
-            f"method out, or give method='radau'"
+            f"method={VARIATIONAL!r} does not support constraints on velocities ({', '.join(rolling)}); leave method "
+            "out, or give method='radau'"
         )
     if S.scales.semidefinite > 0.0:
         thin = [

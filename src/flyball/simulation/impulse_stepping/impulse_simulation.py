@@ -28,6 +28,7 @@ from ...results.body_sets import BodySetMotion
 from ...results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
 from ...results.energy_balance import CONTACT_ELASTIC, EXCHANGE_SIGNS
 from ...results.health import ContactHealth, Health
+from ...results.motion_record import record_motion
 from ...results.result import Result
 from ...tables.contact_tables import ContactTables, contact_tables
 from ...tables.reference_configuration import BodyState
@@ -228,7 +229,7 @@ def body_sets(model: Model, scene: ContactTables, recorder: OutputRecorder) -> d
     return out
 
 
-INTERRUPTED_MESSAGE = "interrupted by the user at t = {:.6g} s; what was computed is kept"
+INTERRUPTED_MESSAGE = "interrupted by the user at t = {:.6g} s; the motion so far is kept"
 END_MESSAGE = "reached the end"
 
 
@@ -260,17 +261,11 @@ def make_impulse_result(
         seconds=time.perf_counter() - since,
         compiling=compiled_since(since),
         options={"method": dataclasses.asdict(o)},
-        coordinates="absolute: steps of impulses",
+        coordinates="absolute: impulse time stepping",
         remarks=contact_warnings(model),
         crowd=sum(b.count for b in model.bulk),
         contact=contact,
     )
-    health.late = {
-        "mobility": partial(mobility, model, base),
-        "energy_drift": lambda: result.energy.drift,
-        "doubtful": lambda: diagnostics.impulse_stepping_doubts(result),
-        "warnings": lambda: diagnostics.impulse_stepping_warnings(result),
-    }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.rows.law)))
     if recorder.held:
@@ -282,6 +277,8 @@ def make_impulse_result(
     result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T, strict=True))
     result.contacts = recorder.as_contacts(contact_bodies, model.planar)
     result.bulk = body_sets(model, scene, recorder)
+    result.record = record_motion(result, accelerations=False)
+    health.late = diagnostics.impulse_judgements(result, partial(mobility, model, base))
     return result
 
 
@@ -375,7 +372,7 @@ def simulate_by_impulses(
     except NoSolution:
         result = with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, ""), before, part)
         t = float(stepper.pace.real[TIME])
-        result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY_MESSAGE}"
+        result.health.message = f"{model.name!r} cannot continue at t = {t:.6g} s: {NO_WAY_MESSAGE}"
         raise SimulationError(result.health.message, result, t) from None
     message = INTERRUPTED_MESSAGE if interrupted else PAUSED_MESSAGE if part.paused else END_MESSAGE
     message = message.format(float(stepper.pace.real[TIME]))

@@ -276,7 +276,7 @@ def place_body_sets(scene: ContactTables, M: Movers, before: Result) -> None:
     for name in names:
         at, b = scene.carriers.slices[name], before.bulk.get(name)
         if b is None or len(b) != at.stop - at.start:
-            raise ModelError(f"the result cannot be gone on with: it has no bodies {name!r}, or another number of them")
+            raise ModelError(f"the result cannot be continued: it has no bodies {name!r}, or another number of them")
         M.pose[at, :3] = b.position[-1]
         M.pose[at, 3:] = np.stack(quaternion_matrix(*b.quaternion[-1].T), axis=1)
         M.twist[at, :3], M.twist[at, 3:] = b.velocity[-1], b.angular_velocity[-1]

@@ -22,7 +22,7 @@ KINDS = {
     "time": "time",
     "state": "state",
     "input": "input",
-    "load": "what presses the surfaces together",
+    "load": "normal force between the surfaces",
 }
 MEANINGS = {
     "angle": "angle",

@@ -173,8 +173,8 @@ def position_groups(s: Structure) -> list[tuple[list[int], list[int]]]:
 def singular_start_error(names: Sequence[str], t: float) -> SingularityError:
     """The error for an initial position where the constraints lose rank."""
     return SingularityError(
-        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} depend on "
-        "each other here and not nearby, so that coordinates cannot be told apart; draw it away from there",
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} are "
+        "dependent here and not nearby, so that independent coordinates cannot be chosen; choose another position",
         t,
         tuple(names),
     )

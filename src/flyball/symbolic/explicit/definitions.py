@@ -150,7 +150,7 @@ class ImplicitSolver:
         self._w = np.array([start.get(n, 0.0) for n in self.unknowns])
         found = self._newton(at, self._w)
         if found is None:
-            raise AnalysisError(f"no {', '.join(self.unknowns)} fulfil their equations at the start")
+            raise AnalysisError(f"no {', '.join(self.unknowns)} satisfy their equations at the start")
         self._at, (self._w, self._sign) = at, found
         if self._sign == 0.0:
             raise SingularityError(f"{', '.join(self.unknowns)} are not determined at the start: it is singular")
@@ -172,7 +172,7 @@ class ImplicitSolver:
             known = ", ".join(f"{n} = {x:.6g}" for n, x in there.items() if n not in self._own)
             raise SingularityError(
                 f"{', '.join(self.unknowns)} cannot be followed to {known}: the mechanism does not close there, or "
-                "there is a singular position on the way"
+                "passes a singular position"
             )
         self._at, self._w = there, w
         return dict(zip(self.unknowns, w.tolist(), strict=True))

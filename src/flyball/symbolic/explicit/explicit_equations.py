@@ -49,7 +49,7 @@ def report(x: ExplicitEquations) -> str:
         f"independent: {free or 'none, drivers leave no freedom'}",
         *(f"{name}: {form_description(how)}" for name, how in x.branches.items()),
         *x.notes,
-        *(["angles are told up to whole turns"] if any(d.closed for d in s.positions) else []),
+        *(["angles are determined up to whole turns"] if any(d.closed for d in s.positions) else []),
     ]
     algebra = ArctangentSubstitution(
         [(w, y, d.radius) for d in s.definitions if d.closed for w, y in definition_pairs(d)]
@@ -77,7 +77,7 @@ def report(x: ExplicitEquations) -> str:
 def form_description(how: str) -> str:
     """Form of an equation as text, without letters that are not defined here."""
     how = re.sub(r"A cos w \+ B sin w \+ C = 0, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
-    how = how.replace("A cos w + B sin w = 0", "the drawn one of two opposite directions")
+    how = how.replace("A cos w + B sin w = 0", "of two opposite directions that of the reference configuration")
     return re.sub(r"quadratic, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
 
 
@@ -263,8 +263,8 @@ class ExplicitEquations:
         among = np.abs(y[: len(lam)].T @ slope)
         if (among > INPUT_THRESHOLD * np.abs(slope).max(initial=0.0)).any():
             raise ModelError(
-                f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
-                "for other quantities, or take the redundancy out: m.mobility() names it"
+                f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it "
+                "undetermined; choose other quantities, or remove the redundancy: m.mobility() names it"
             )
 
     @staticmethod

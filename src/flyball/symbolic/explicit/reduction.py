@@ -108,7 +108,7 @@ def solve_positions(
     order = [*pool.found, *left, *reversed(pool.later)]
     turned = [_with_reference_turns(d, pool.probe) for d in order]
     if None in turned or not _fulfil_equations(g, [d for d in turned if d is not None], place):
-        note = "formulas were found that do not hold: please report this mechanism"
+        note = "formulas were found that are wrong: please report this mechanism"
         return SolvedPositions(_implicit(g, w, place.probe), [], [note])
     known = _given(x, unknown)
     done = follow_whole_turns([d for d in turned if d is not None], known, pool.probe.start)
@@ -135,7 +135,7 @@ def _reason(d: Definition, elements: Sequence[str]) -> str:
     of = ", ".join(dict.fromkeys(elements))
     if n == 1:
         return f"{d.names[0]}: no formula for its equation of {of}; Newton's method solves it"
-    return f"{', '.join(d.names)}: no formulas, {n} equations of {of} hold them together; Newton's method solves them"
+    return f"{', '.join(d.names)}: no formulas; {n} equations of {of} determine them, solved by Newton's method"
 
 
 def _with_reference_turns(d: Definition, probe: Probe) -> Definition | None:

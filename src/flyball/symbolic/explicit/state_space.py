@@ -66,7 +66,7 @@ class StateEquations:
         for s in symbols_of([*self.f.list(), *self.h.list()]):
             if s.moving and s.index not in known:
                 raise AnalysisError(
-                    f"the state space depends on {s.data.name!r}, which no state tells in "
+                    f"the state space depends on {s.data.name!r}, which is no function of the states in "
                     f"{self.equations.coordinates.partition(':')[0]} coordinates; try other coordinates"
                 )
 

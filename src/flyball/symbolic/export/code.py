@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 EQUATIONS = "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma"
 
 CALLING_CONVENTIONS = {
-    "c": "Arguments and results are arrays of double, matrices row by row; results have to be there. Nothing is kept "
-    "from one call to the next, so that threads may share them. Compile with a C99 compiler, link with -lm.",
+    "c": "Arguments and results are arrays of double, matrices row by row; results must be allocated by the caller. "
+    "The functions have no static data, so threads may share them. Compile with a C99 compiler, link with -lm.",
     "python": "Arguments are numbers and sequences; arrays of states have the states' own axes first, and so have the "
     "results. NumPy is all that is needed.",
-    "casadi": "Functions of SX; they take numbers, SX and MX. Matrices are matrices, several of them stand below one "
-    "another. The files beside this one hold them.",
+    "casadi": "Functions of SX; they take numbers, SX and MX. Matrices are matrices, several of them are stacked. "
+    "The other files in this folder contain them.",
     "numba": "Arguments are floats and arrays of floats; one state at a time.",
 }
 
@@ -50,7 +50,7 @@ def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> st
         f"    {EQUATIONS}",
         "",
         *textwrap.wrap(
-            "SI units and radians. World axes unless told otherwise. Velocities v are rates of the coordinates q, "
+            "SI units and radians. World axes unless stated otherwise. Velocities v are rates of the coordinates q, "
             "but for bodies that turn freely: unit quaternions e0 to e3 (scalar first) in q, angular velocities w_x, "
             "w_y, w_z along the body's own axes in v. Reactions are G^T lam.",
             105,

@@ -68,7 +68,7 @@ class Functions:
             "v": Argument("v", x.v, "velocities"),
             "vdot": Argument("vdot", eq.named_equations.vdot, "accelerations"),
             "lam": Argument("lam", x.lam, "multipliers"),
-            "loads": Argument("loads", x.loads, "what presses together the surfaces of joints with friction"),
+            "loads": Argument("loads", x.loads, "normal forces of joints with friction"),
             "places": Argument("places", places, "places of followers on their curves"),
             "u": Argument("u", u, "inputs", (0.0,) * len(u)),
             "p": Argument("p", p, "parameters", tuple(n.value for n in p)),
@@ -189,7 +189,7 @@ def g(x: Functions) -> FunctionParts:
 @exported_function
 def nu(x: Functions) -> FunctionParts:
     """Right-hand side of velocities."""
-    return {"nu": x.traced.nu}, "t q p", "What constraints ask of velocities: G v = nu.", {}
+    return {"nu": x.traced.nu}, "t q p", "Velocity constraints: G v = nu.", {}
 
 
 @exported_function
@@ -201,7 +201,7 @@ def G(x: Functions) -> FunctionParts:
 @exported_function
 def gamma(x: Functions) -> FunctionParts:
     """Right-hand side of accelerations."""
-    return {"gamma": x.traced.gamma}, "t q v p", "What constraints ask of accelerations: G vdot = gamma.", {}
+    return {"gamma": x.traced.gamma}, "t q v p", "Acceleration constraints: G vdot = gamma.", {}
 
 
 @exported_function

@@ -128,9 +128,9 @@ def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at
 def unsteady_error(m: TracedMechanism) -> AnalysisError:
     """The error for a motion that is not steady."""
     return AnalysisError(
-        f"{m.model.name!r} does not stay there as it is: its velocities change, or its linear equations do. Symbolic "
-        f"ones are about equilibria, and about motions in which coordinates of joints turn or slide evenly while all "
-        f"others stand still (coordinates='joint'); linearize takes other steady motions, in numbers"
+        f"{m.model.name!r} is in no steady state there: its velocities change, or its linear equations do. Symbolic "
+        "linear equations are about equilibria, and about motions in which joint coordinates change uniformly while "
+        "all others are constant (coordinates='joint'); linearize supports other steady motions, in numbers"
     )
 
 
@@ -153,12 +153,12 @@ def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence
     for name in names:
         if name not in m.given:
             raise ModelError(
-                f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by; where an input is "
-                f"to balance, give the force or torque beside it a parameter: torque='tau'"
+                f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by; if an input "
+                "balances it, use a parameter in that force or torque: torque='tau'"
             )
     if len(at) != len(names):
         raise ModelError(
-            f"{len(at)} conditions of equilibrium tell {len(at)} parameters, not {len(names)} ({', '.join(names)})"
+            f"{len(at)} conditions of equilibrium determine {len(at)} parameters, not {len(names)} ({', '.join(names)})"
         )
     symbols = [m.given[k] for k in names]
     J = jacobian(at, symbols)
@@ -169,7 +169,7 @@ def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence
     try:
         found = solve_equations(J, -rest)[:, 0]
     except DependentEquations:
-        raise ModelError(f"equilibrium does not tell {', '.join(names)}: take other parameters") from None
+        raise ModelError(f"equilibrium does not determine {', '.join(names)}: choose other parameters") from None
     return [(s, m.graph.node(x)) for s, x in zip(symbols, found, strict=True)]
 
 
@@ -201,7 +201,7 @@ class Validity:
         """
         told = ", ".join(f"{k} = {x:g}" for k, x in values.items())
         remedy = (
-            "give the others that go with it, or make the equations about the point that belongs to them: "
+            "give all that belong to that point, or make the equations about the point that belongs to these: "
             "symbolic(parameters=...), linear(at=m.equilibrium(parameters=...))"
         )
         if _residuals(self.loops, values, CLOSURE_TOLERANCE) is not None:

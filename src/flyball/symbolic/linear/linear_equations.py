@@ -424,5 +424,8 @@ def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMecha
 def reference_or_given(m: TracedMechanism, at: Mapping[str, Any] | None) -> OperatingPoint:
     """The given point, or the reference configuration if its loops are closed; else moved to close them."""
     if not (at is None or isinstance(at, Mapping)):
-        raise ModelError(f"at={at!r}: must be a mapping of coordinates, an equilibrium, a result, or None for as drawn")
+        raise ModelError(
+            f"at={at!r}: must be a mapping of coordinates, an equilibrium, a result, or None for the reference "
+            "configuration"
+        )
     return given_point(m, at or {}) if at or len(m.g) else reference_point(m)

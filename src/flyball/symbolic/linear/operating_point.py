@@ -63,8 +63,8 @@ def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[
     missed = nominal_values(matrix_product(A, v)) - nominal_values(right)
     if np.abs(missed).max() > CONSISTENCY_TOLERANCE * np.abs(nominal_values(right)).max():
         raise ModelError(
-            f"the joints of {m.model.name!r} do not allow the velocities that its bodies are told; give "
-            f"at=m.equilibrium(turning=[...])"
+            f"the joints of {m.model.name!r} do not allow the given velocities of its bodies; give "
+            "at=m.equilibrium(turning=[...])"
         )
     return list(v[:, 0])
 
@@ -179,8 +179,8 @@ def reference_point(m: TracedMechanism) -> OperatingPoint:
         for name, value in _initial_condition(m, e):
             if value is not None and name not in at:
                 raise ModelError(
-                    f"the initial condition of {e.name!r} is of no coordinate that these equations are in; say where "
-                    f"the mechanism is: at={{...}}, or at=m.equilibrium()"
+                    f"the initial condition of {e.name!r} is for a coordinate that these equations do not have; give "
+                    "the position: at={...}, or at=m.equilibrium()"
                 )
             if value is not None:
                 _set_entry(q, v, at[name], value)
@@ -291,7 +291,8 @@ def closed_point(
             numbers[s.data.name] += float(d)
     if np.abs(gaps()).max() > CLOSURE_TOLERANCE * length:
         raise ModelError(
-            f"{m.model.name!r} cannot be closed with {', '.join(map(repr, at)) or 'the coordinates as drawn'}: gaps of "
+            f"{m.model.name!r} cannot be closed with "
+            f"{', '.join(map(repr, at)) or 'the coordinates of the reference configuration'}: gaps of "
             f"{np.abs(gaps()).max():.3g} are left; give coordinates that can be, or at=m.equilibrium()"
         )
     moved = [k for k, (s, x) in enumerate(zip(m.x.q, point.q, strict=True))
@@ -326,8 +327,8 @@ def _with_rates(m: TracedMechanism, point: OperatingPoint) -> OperatingPoint:
     missed = np.abs(np.array(evaluate(list(m.n), point.numbers(m)), float)).max()
     if missed > CLOSURE_TOLERANCE * (max(abs(nominal_value(x)) for x in v) + 1.0) * max(m.values.length, 1.0):
         raise ModelError(
-            f"the velocities of {m.model.name!r} there do not fulfil its constraints (they miss by {missed:.3g}): give "
-            f"the rates of all coordinates that move, for instance at={{'A.angle rate': 'omega'}}, or "
-            f"at=m.equilibrium(turning=[...])"
+            f"the velocities of {m.model.name!r} there do not satisfy its constraints (by {missed:.3g}): give the "
+            "rates of all coordinates that move, for instance at={'A.angle rate': 'omega'}, or "
+            "at=m.equilibrium(turning=[...])"
         )
     return point

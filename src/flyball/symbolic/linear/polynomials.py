@@ -46,9 +46,9 @@ class PolynomialRing:
         count = len(nodes_in_order(flat))
         if count > MAX_TERMS_OF_ENTRY:
             raise ModelError(
-                f"the linear equations of {what} have {count} operations in their coefficients, and transfer functions "
-                f"with symbols are found up to {MAX_TERMS_OF_ENTRY}: ask for numbers (linearize), or give numbers for "
-                f"parameters"
+                f"the linear equations of {what} have {count} operations in their coefficients, and transfer "
+                f"functions with symbols are found up to {MAX_TERMS_OF_ENTRY}: use numbers (linearize), or give "
+                "numbers for parameters"
             )
         self.graph = next((x.graph for x in flat if isinstance(x, Node)), None) or Graph()  # graph of the expressions
         self.printer = SympyPrinter(positive=positive)
@@ -327,7 +327,7 @@ def determinant(rows: Sequence[Sequence[Any]], ring: Any, what: str) -> Any:
     if n > MAX_ORDER:
         raise ModelError(
             f"the linear equations of {what} are {n} with their constraints, and transfer functions with symbols are "
-            f"found up to {MAX_ORDER}: ask for numbers (linearize)"
+            f"found up to {MAX_ORDER}: use numbers (linearize)"
         )
     order = sorted(range(n), key=lambda k: sum(bool(x) for x in rows[k]))
     sparse = [[(j, x) for j, x in enumerate(rows[k]) if x] for k in order]
@@ -350,7 +350,7 @@ def determinant(rows: Sequence[Sequence[Any]], ring: Any, what: str) -> Any:
                 raise ModelError(
                     f"the determinant of the linear equations of {what} has minors of {len(found)} terms, and "
                     f"transfer functions with symbols are found up to {MAX_TERMS}: give numbers for some parameters, "
-                    f"or ask for numbers (linearize)"
+                    "or use numbers (linearize)"
                 )
         return found
 

@@ -81,7 +81,7 @@ def _indices(m: TracedMechanism, requested: Sequence[str]) -> np.ndarray | None:
     known = [n.name for n in m.names]
     for name in requested:
         if name not in known:
-            raise ModelError(f"there is no coordinate {name!r} to tell the others by; there are {', '.join(known)}")
+            raise ModelError(f"there is no coordinate {name!r} among those that can be independent: {', '.join(known)}")
     return np.sort([known.index(name) for name in requested]) if requested else None
 
 
@@ -106,7 +106,7 @@ def _chosen(
     if requested is not None:
         if len(requested) != len(chosen) or rank(N[requested]) < len(chosen):
             raise ModelError(
-                f"{', '.join(m.names[d].name for d in requested)} do not tell the other coordinates there: "
+                f"{', '.join(m.names[d].name for d in requested)} do not determine the other coordinates there: "
                 f"{len(chosen)} that do are {', '.join(m.names[d].name for d in chosen)}"
             )
         chosen = requested
@@ -301,7 +301,7 @@ def state_space_matrices(
         output, i, rate = bad
         why = (
             f"output {outputs[output][0]!r} follows the {rate} of input {m.inputs[i].name!r}, which no state-space "
-            f"model can; leave out one of the two, or ask for the transfer function"
+            "model describes; leave out one of the two, or use the transfer function"
         )
     here, rates = ([m.names[d] for d in of] for of in (f.chosen, f.chosen_v))
     still = [(s, 0.0) for s in m.added]

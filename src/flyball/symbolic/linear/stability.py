@@ -73,7 +73,7 @@ class StabilityConditions:
         """Labels and texts of the report."""
         out = [("stable if", str(c)) for c in self.conditions] or [("stable", "always")]
         if any(c == False for c in self.conditions):  # noqa: E712 - SymPy's
-            out = [("stable", "never: nothing takes the energy of some motions away, or something drives them")]
+            out = [("stable", "never: some motions are undamped or unstable")]
         if self.positive:
             out.append(("with", f"{', '.join(map(str, self.positive))} > 0"))
         if self.zeros:

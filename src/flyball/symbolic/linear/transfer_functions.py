@@ -291,7 +291,7 @@ class TransferFunction:
         """Labels and texts of the report."""
         out = [("from", with_unit(self.input, self.input_unit)), ("to", with_unit(self.output, self.output_unit))]
         if all(c == 0 for c in self.num):
-            return [*out, ("transfer function", "0: to first order the output does not answer to this input")]
+            return [*out, ("transfer function", "0: to first order the output does not depend on this input")]
         out += [
             ("numerator", polynomial_text(self._terms(self.num))),
             ("denominator", polynomial_text(self._terms(self.den))),
