@@ -351,8 +351,7 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
         raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
-            f"{IMPULSE_STEPPING} uses absolute coordinates, where joints close to rounding; leave "
-            "coordinates out"
+            f"{IMPULSE_STEPPING} uses absolute coordinates, where joints close to rounding; leave coordinates out"
         )
     return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as requested")
 
