@@ -57,10 +57,11 @@ def values_with_input_step(e: EquationDerivatives, i: Input) -> Values:
     return e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
 
 
-def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of the equations of motion, of all constraints, and of their velocity form by the inputs.
+def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, ...]:
+    """Derivatives by the inputs.
 
-    Shapes: (nv, inputs), then twice (rows and prescribed coordinates, inputs).
+    Of the equations of motion (nv, inputs), of all constraints and of their velocity form (rows and prescribed
+    coordinates, inputs), and of the laws of controller states (nz, inputs).
     """
     by, g, n = [], [], []
     for i in inputs:
@@ -72,7 +73,7 @@ def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.n
     W = np.array(by).reshape(len(inputs), e.width).T
     prescribed = len(e.state.c.structure.prescribed)
     given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
-    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates])
+    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates]), W[e.at["s"]]
 
 
 # Up to so many velocities and freedoms the constraints are eliminated and the matrices are dense.
@@ -98,6 +99,7 @@ def uses_sparse_equations(x: MechanismState, free: int) -> bool:
     many = exceeds_dense_size(
         DENSE_VELOCITIES if s.loads else free, s.nv, len(s.rows)
     )  # joint friction is implemented in the dense equations only
+    many = many and not s.controls  # these, too
     return many and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
 
 
@@ -308,7 +310,7 @@ def _assembled_descriptor(
     G = _all_rows(e)
     others = G.shape[0] - len(s.rows)
     holonomic = np.r_[[r.holonomic for r in s.rows], np.ones(others, bool)].astype(bool)
-    r, g, n = input_effects(e, inputs)
+    r, g, n, s_w = input_effects(e, inputs)
     gaps = np.where(holonomic[: len(g), None], g, n)
     gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(g), len(inputs)))])
     V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
@@ -319,25 +321,34 @@ def _assembled_descriptor(
     by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])
     D = np.array([_direct_feedthrough(e, outputs, i) for i in inputs]).reshape(len(inputs), len(outputs)).T
     of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in massless_rotations(e)]
+    none, states = sp.csr_matrix((len(rows), e.nz)), [x.name for x in s.controls]
+    held_states = e.sampled[:, None]
+    rates = [
+        np.where(held_states, 0.0, X) for X in (e.by_position[at["s"]].toarray(), e.by_velocity[at["s"]].toarray())
+    ]
+    by_states = sp.csr_matrix(np.where(held_states, 0.0, e.by_state[at["s"]]))
     M, W, K = (X[at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    kinematic, turned = turning
+    no = sp.csr_matrix((e.nz, e.nz))
+    by_controls = (sp.csr_matrix((len(outputs), e.nz)), C[:, C.shape[1] - e.nz :], sp.csr_matrix((len(outputs), e.nz)))
     return Descriptor(
-        mass=M,
-        damping=W,
-        stiffness=K,
-        constraints=G[rows].tocsr(),
+        mass=sp.block_diag([M, sp.identity(e.nz)]).tocsr(),
+        damping=sp.bmat([[W, sp.csr_matrix(e.by_state[at["r"]])], [sp.csr_matrix(-rates[1]), -by_states]]).tocsr(),
+        stiffness=sp.bmat([[K, None], [sp.csr_matrix(-rates[0]), no]]).tocsr(),
+        constraints=sp.hstack([G[rows], none]).tocsr(),
         on_positions=holonomic[rows],
-        by_position=V[rows].tocsr(),
-        kinematic=kinematic.tocsr(),
-        turning=turned.tocsr(),
-        forces=r,
+        by_position=sp.hstack([V[rows], none]).tocsr(),
+        kinematic=sp.block_diag([turning[0], no]).tocsr(),
+        turning=sp.block_diag([turning[1], no]).tocsr(),
+        forces=np.vstack([r, -np.where(held_states, 0.0, s_w)]),
         gaps=gaps[rows],
-        C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] for k in range(3)), by_rows]).tocsr(),
+        C=sp.hstack(
+            [part for k in range(3) for part in (C[:, k * nv : (k + 1) * nv], by_controls[k])] + [by_rows]
+        ).tocsr(),
         D=D,
-        coordinates=tuple(x.name for x in names),
-        units=tuple(x.unit for x in names),
+        coordinates=(*(x.name for x in names), *(f"integral of {name}" for name in states)),
+        units=(*(x.unit for x in names), *("" for _ in states)),
         rows=tuple(of[k] for k in rows),
-        scale=c.sizes / c.values.length,
+        scale=np.r_[c.sizes / c.values.length, np.ones(e.nz)],
     )
 
 

@@ -56,7 +56,7 @@ def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
 
     begin = state(a.parameters)
     f, _, _ = equations_without_inputs(begin)
-    refuse_nonsmooth(EquationDerivatives(begin), np.zeros((len(begin.v), 1)), np.zeros((len(begin.v), 1)), a.to)
+    refuse_nonsmooth(EquationDerivatives(begin), *np.zeros((2, len(begin.v), 1)), to=a.to)
     return lambda parameters: equations_without_inputs(state(parameters), like=f)[2].A, "1/s"
 
 
