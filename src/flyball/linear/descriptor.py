@@ -9,7 +9,7 @@ in absolute coordinates. They are refused in the same cases as by `linearize`, w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -321,34 +321,56 @@ def _assembled_descriptor(
     by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])
     D = np.array([_direct_feedthrough(e, outputs, i) for i in inputs]).reshape(len(inputs), len(outputs)).T
     of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in massless_rotations(e)]
-    none, states = sp.csr_matrix((len(rows), e.nz)), [x.name for x in s.controls]
-    held_states = e.sampled[:, None]
-    rates = [
-        np.where(held_states, 0.0, X) for X in (e.by_position[at["s"]].toarray(), e.by_velocity[at["s"]].toarray())
-    ]
-    by_states = sp.csr_matrix(np.where(held_states, 0.0, e.by_state[at["s"]]))
     M, W, K = (X[at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    no = sp.csr_matrix((e.nz, e.nz))
-    by_controls = (sp.csr_matrix((len(outputs), e.nz)), C[:, C.shape[1] - e.nz :], sp.csr_matrix((len(outputs), e.nz)))
-    return Descriptor(
-        mass=sp.block_diag([M, sp.identity(e.nz)]).tocsr(),
-        damping=sp.bmat([[W, sp.csr_matrix(e.by_state[at["r"]])], [sp.csr_matrix(-rates[1]), -by_states]]).tocsr(),
-        stiffness=sp.bmat([[K, None], [sp.csr_matrix(-rates[0]), no]]).tocsr(),
-        constraints=sp.hstack([G[rows], none]).tocsr(),
+    kinematic, turned = turning
+    out = Descriptor(
+        mass=M,
+        damping=W,
+        stiffness=K,
+        constraints=G[rows].tocsr(),
         on_positions=holonomic[rows],
-        by_position=sp.hstack([V[rows], none]).tocsr(),
-        kinematic=sp.block_diag([turning[0], no]).tocsr(),
-        turning=sp.block_diag([turning[1], no]).tocsr(),
-        forces=np.vstack([r, -np.where(held_states, 0.0, s_w)]),
+        by_position=V[rows].tocsr(),
+        kinematic=kinematic.tocsr(),
+        turning=turned.tocsr(),
+        forces=r,
         gaps=gaps[rows],
-        C=sp.hstack(
-            [part for k in range(3) for part in (C[:, k * nv : (k + 1) * nv], by_controls[k])] + [by_rows]
-        ).tocsr(),
+        C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] for k in range(3)), by_rows]).tocsr(),
         D=D,
-        coordinates=(*(x.name for x in names), *(f"integral of {name}" for name in states)),
-        units=(*(x.unit for x in names), *("" for _ in states)),
+        coordinates=tuple(x.name for x in names),
+        units=tuple(x.unit for x in names),
         rows=tuple(of[k] for k in rows),
-        scale=np.r_[c.sizes / c.values.length, np.ones(e.nz)],
+        scale=c.sizes / c.values.length,
+    )
+    return _with_controllers(out, e, C[:, C.shape[1] - e.nz :], s_w) if e.nz else out
+
+
+def _with_controllers(d: Descriptor, e: EquationDerivatives, by_state: Any, by_input: np.ndarray) -> Descriptor:
+    """Add the controller states as velocities of further coordinates, their integrals; sampled ones are constant.
+
+    ``by_state`` and ``by_input`` are the derivatives of the outputs by the states, and of the laws by the inputs.
+    """
+    import scipy.sparse as sp
+
+    r, s, nv, n = e.at["r"], e.at["s"], e.state.c.structure.nv, e.nz
+    changes = sp.diags(-1.0 * ~e.sampled)
+    x, v, z = (changes @ sp.csr_matrix(X[s]) for X in (e.by_position, e.by_velocity, e.by_state))
+    none, of_rows, of_outputs = (sp.csr_matrix((k, n)) for k in (n, len(d.rows), d.C.shape[0]))
+    C = [d.C[:, :nv], of_outputs, d.C[:, nv : 2 * nv], by_state, d.C[:, 2 * nv : 3 * nv], of_outputs, d.C[:, 3 * nv :]]
+    states = [k.name for k in e.state.c.structure.controls]
+    return replace(
+        d,
+        mass=sp.block_diag([d.mass, sp.identity(n)]).tocsr(),
+        damping=sp.bmat([[d.damping, sp.csr_matrix(e.by_state[r])], [v, z]]).tocsr(),
+        stiffness=sp.bmat([[d.stiffness, None], [x, none]]).tocsr(),
+        constraints=sp.hstack([d.constraints, of_rows]).tocsr(),
+        by_position=sp.hstack([d.by_position, of_rows]).tocsr(),
+        kinematic=sp.block_diag([d.kinematic, none]).tocsr(),
+        turning=sp.block_diag([d.turning, none]).tocsr(),
+        forces=np.vstack([d.forces, changes @ by_input]),
+        C=sp.hstack(C).tocsr(),
+        coordinates=(*d.coordinates, *(f"integral of {name}" for name in states)),
+        units=(*d.units, *("" for _ in states)),
+        scale=np.r_[d.scale, np.ones(n)],
     )
 
 
