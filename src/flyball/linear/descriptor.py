@@ -182,7 +182,7 @@ class SparseEquations:
         """Refuse kinks of forces that a free motion crosses."""
         found = []
         for k in nonsmooth_points(self.e, to):
-            ways = [self.scale**2 * part for part in k.along]  # steepest direction, in scaled units
+            ways = [self.scale**2 * part for part in k.along[:2]]  # steepest direction, in scaled units
             dq, dv = (self.freed(way) for way in ways)
             if k.is_crossed_by(np.stack([dq, 0.0 * dq], 1), np.stack([0.0 * dv, dv], 1)):
                 found.append(k)
