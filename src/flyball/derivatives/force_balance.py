@@ -163,13 +163,15 @@ def _computed_sizes(e: EquationDerivatives) -> StateSizes:
     pace = float(e.state.c.values.system.scales.rate.real)
     moved = (abs(e.by_position[s].toarray()) * size).max(axis=1, initial=0.0)  # rates by large steps of the mechanism
     between = np.abs(e.state_jacobian)
-    own = np.diag(between)
-    usual = _usual_states(np.abs(e.state.z[: e.nz]), moved, between, np.where(own > 0.0, own, pace or 1.0))
+    decay = np.diag(between)
+    usual = _usual_states(np.abs(e.state.z[: e.nz]), moved, between, np.where(decay > 0.0, decay, pace or 1.0))
     energy = _energy_scale(e, float(among.max() if among.nnz else 0.0), usual) or inertia * pace**2 or 1.0
     forces = (np.abs(e.by_state[r]) * size[:, None]).max(axis=0, initial=0.0)  # per unit state
     change = np.where(forces > 0.0, energy / np.where(forces > 0.0, forces, 1.0), np.nan)
     change = _propagated_changes(change, moved, between)
-    alone = np.abs(e.state.z[: e.nz]) + np.where(own > 0.0, np.abs(e.state_rates) / np.where(own > 0.0, own, 1.0), 0.0)
+    alone = np.abs(e.state.z[: e.nz]) + np.where(
+        decay > 0.0, np.abs(e.state_rates) / np.where(decay > 0.0, decay, 1.0), 0.0
+    )
     change = np.where(np.isnan(change) & (alone > 0.0), alone, change)  # value plus distance to rest
     change = _propagated_changes(change, moved, between)
     change = np.where(np.isnan(change), 1.0, change)
@@ -188,11 +190,11 @@ def _propagated_changes(change: np.ndarray, moved: np.ndarray, between: np.ndarr
     return change
 
 
-def _usual_states(z: np.ndarray, moved: np.ndarray, between: np.ndarray, own: np.ndarray) -> np.ndarray:
+def _usual_states(z: np.ndarray, moved: np.ndarray, between: np.ndarray, decay: np.ndarray) -> np.ndarray:
     """Magnitudes of the states, at least those to which large steps of the mechanism lead them, (nz,)."""
-    followed = moved / own
+    followed = moved / decay
     for _ in range(len(z)):
-        followed = np.where(followed > 0.0, followed, (between * followed).max(axis=1, initial=0.0) / own)
+        followed = np.where(followed > 0.0, followed, (between * followed).max(axis=1, initial=0.0) / decay)
     return z + followed
 
 

@@ -55,7 +55,7 @@ from .descriptor import (
     values_with_input_step,
 )
 from .operating_point import SizeTest, contact_operating_point, operating_state
-from .sampled_controllers import SampledSignal, cycle_equations, refuse_unsettled
+from .sampling_cycle import SampledSignal, cycle_equations, refuse_unsettled
 
 # For `refuse_switching_with_controllers`.
 SMALL_MOTIONS, JOINTS_INSTEAD = "small motions know", "put joints in its place"
