@@ -1,4 +1,4 @@
-"""Energies beside controllers, which have none: bodies that stand for their states in derivatives count in nothing."""
+"""Energies beside controllers, which have none."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def differenced(m: fb.Mechanism, name: str, by: str) -> np.ndarray:
 
 @pytest.mark.parametrize("unit", [1.0, 1e7, 1e-4])
 def test_energies_of_a_motion_change_as_those_of_simulated_ones(unit):
-    """Whatever the states' units are: what stands for them is as heavy as it needs be and does no work that counts."""
+    """Whatever the states' units are."""
     m = arm(unit=unit)
     of = ["energy.kinetic", "energy.potential", "energy.total", "energy.elastic", "motor.work", "lag.value"]
     s = m.sensitivity(of, ["kp", "M"], analysis="motion", t_end=TIMES[-1], outputs=TIMES, rtol=1e-10)
@@ -80,7 +80,7 @@ def test_a_mass_is_found_by_kinetic_energies():
 
 
 def test_energies_at_rest_are_the_rods_and_the_springs():
-    """Along and across the slides of what stands for states: the weight that it has there counts in nothing."""
+    """Those of the rod and of the spring alone."""
     m = arm()
     s = m.sensitivity(["energy.potential", "energy.total", "energy.kinetic"], ["M", "r"], analysis="equilibrium")
     r, along = 0.6, 0.4 * np.array([np.cos(0.6), np.sin(0.6)])

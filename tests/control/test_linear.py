@@ -191,3 +191,32 @@ def test_modes_in_a_study_are_those_of_the_closed_loop_where_it_rests():
         assert np.asarray(found["stable"])[k] == 1.0
     with pytest.raises(fb.ModelError, match="PID 'pid', sampled, and modes is about continuous time"):
         slide(pid(period=0.01), r=0.0).study({"r": [0.0, 1.0]}, of, analysis="modes")
+
+
+def test_the_descriptor_form_says_the_same():
+    m = slide(pid(), fb.Lag("act", of="pid", time=0.05), force="act", r=0.0)
+    lin = m.linearize(["r", "drive"], ["A.displacement", "pid", "act.value", "drive.force"])
+    w = np.array([0.3, 3.0, 30.0])
+    for i, into in enumerate(lin.inputs):
+        for k, out in enumerate(lin.outputs):
+            assert lin.descriptor.response(w, i, k) == pytest.approx(lin.response(w, into, out), rel=1e-10, abs=1e-12)
+
+
+def test_a_steady_rotation_that_a_pi_keeps():
+    """The same eigenvalues in both layers; the angle of the rotation itself is a zero."""
+    m = fb.Mechanism("spin", gravity=(0, 0, -9.81))
+    m.add(
+        fb.Body("base", mass=3, inertia=(0.1, 0.1, 0.2)),
+        fb.Body("rod", mass=1, inertia=(0.05, 0.05, 0.01), position=(0.3, 0, -0.3)),
+    )
+    m.add(fb.Revolute("A", "ground", "base", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(
+        fb.Revolute("B", "base", "rod", at=(0, 0, 0), axis=(0, 1, 0)), fb.TorsionalSpringDamper("d", "B", damping=2.0)
+    )
+    m.add(fb.PID("pid", setpoint="6", measured="A.angle_rate", kp=5, ki=9), fb.Motor("motor", "A", torque="pid"))
+    run = m.simulate(60, outputs=2, rtol=1e-11, atol=1e-12)
+    both = [m.linearize(about=run, coordinates=layer) for layer in ("absolute", "joint")]
+    assert both[0].eigenvalues == pytest.approx(both[1].eigenvalues, rel=1e-9, abs=1e-9)
+    assert both[0].turning == pytest.approx([0, 0, 6], rel=1e-9)
+    assert both[0].eigenvalues[0] == 0.0
+    assert m.modes(about=run, coordinates="absolute").stable

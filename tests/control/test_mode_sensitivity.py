@@ -60,3 +60,17 @@ def test_gains_are_found_that_place_poles():
     m = slide(fb.PID("pid", setpoint="0", measured="A.displacement", kp="kp", ki="ki"), kp=4.0, ki=15.0)
     best = m.optimize([], ["kp", "ki"], target=wanted, analysis="modes", progress=False)
     assert best.parameters == pytest.approx({"kp": 5.0, "ki": 20.0}, rel=1e-6)
+
+
+def test_of_a_loop_at_its_equilibrium():
+    """A four-bar linkage: other coordinates may be as independent at another value of the gain."""
+    m = fb.Mechanism("fourbar", planar=True, gravity=(0, -9.81), parameters={"r": 0.1, "kp": 40.0})
+    for name, x, y in (("a", 0, 0.5), ("b", 1, 1), ("c", 2, 0.5)):
+        m.add(fb.Body(name, mass=1, inertia=0.1, position=(x, y)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(0, 1)))
+    m.add(fb.Revolute("C", "b", "c", at=(2, 1)), fb.Revolute("D", "c", "ground", at=(2, 0)))
+    m.add(fb.TorsionalSpringDamper("spring", "A", stiffness=5, damping=0.4))
+    m.add(fb.PID("pid", setpoint="r", measured="A.angle", kp="kp", ki=20, kd=5, filter=0.05))
+    m.add(fb.Lag("lag", of="pid", time=0.02), fb.Motor("motor", "A", torque="lag"))
+    s = m.sensitivity(to=["r", "kp"], analysis="modes", about="equilibrium", verify=True)
+    assert s.verification == pytest.approx(s.derivatives, rel=1e-5, abs=1e-6)

@@ -189,8 +189,9 @@ class MechanismState:
 class EquationDerivatives:
     """The residuals at a state and their derivatives.
 
-    Names of blocks: ``r`` = M vdot - f - G^T lam - effort, ``g``, ``n`` = G v - nu, ``a`` = G vdot - gamma, and
-    ``value``, ``rate``, ``acceleration`` of the measured quantities.
+    Names of blocks: ``r`` = M vdot - f - G^T lam - effort, ``g``, ``n`` = G v - nu, ``a`` = G vdot - gamma,
+    ``value``, ``rate``, ``acceleration`` of the measured quantities, and ``s``: the rates of the controller states z,
+    for sampled ones their values from the next instant on.
     """
 
     def __init__(self, state: MechanismState) -> None:
@@ -198,15 +199,17 @@ class EquationDerivatives:
         self.state = state
         s = state.c.structure
         nv, nr, nm = s.nv, len(s.rows), len(s.measured)
-        ends = np.cumsum([0, nv, nr, nr, nr, nm, nm, nm])
-        names = ("r", "g", "n", "a", "value", "rate", "acceleration")
+        self.nz = len(s.controls)
+        self.sizes: Any = None  # see `force_balance.state_sizes`
+        ends = np.cumsum([0, nv, nr, nr, nr, nm, nm, nm, self.nz])
+        names = ("r", "g", "n", "a", "value", "rate", "acceleration", "s")
         self.at = {k: slice(i, j) for k, i, j in zip(names, ends[:-1], ends[1:], strict=True)}
         self.width = int(ends[-1])
 
     @cached_property
     def residual(self) -> np.ndarray:
         """All residuals at the state, (width,)."""
-        out = self._run(np.zeros((1, 3 * self.state.c.structure.nv + 1), complex))[0].real
+        out = self._run(self._steps(1))[0].real
         out[self.at["r"]] -= self.state.effort
         return out
 
@@ -230,6 +233,28 @@ class EquationDerivatives:
         return self._jacobian(2)
 
     @cached_property
+    def by_state(self) -> np.ndarray:
+        """Derivatives by the controller states, (width, nz)."""
+        steps = self._steps(self.nz)
+        steps[:, steps.shape[1] - self.nz :] = 1j * COMPLEX_STEP * np.eye(self.nz)
+        return complex_step_derivative(self._run(steps)).T
+
+    @cached_property
+    def sampled(self) -> np.ndarray:
+        """Whether each controller state is sampled, (nz,)."""
+        return np.array([x.controller.sampled for x in self.state.c.structure.controls], bool)
+
+    @property
+    def state_rates(self) -> np.ndarray:
+        """Rates of the controller states; for sampled ones the change at the next instant, (nz,)."""
+        return self.block("s") - np.where(self.sampled, self.state.z[: self.nz], 0.0)
+
+    @property
+    def state_jacobian(self) -> np.ndarray:
+        """Derivatives of `state_rates` by the controller states, (nz, nz)."""
+        return self.by_state[self.at["s"]] - np.diag(1.0 * self.sampled)
+
+    @cached_property
     def by_reactions(self) -> np.ndarray:
         """Derivatives of r by the multipliers besides -G^T (nv, rows): the part F of joint friction."""
         return friction_by_multipliers(self.state, *self.complex_tables)
@@ -240,8 +265,7 @@ class EquationDerivatives:
 
     def by_values(self, stepped: Values) -> np.ndarray:
         """Derivatives from parameter values that contain a complex step, (width,)."""
-        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
-        return complex_step_derivative(self._run(steps, complex_system(stepped.system))[0])
+        return complex_step_derivative(self._run(self._steps(1), complex_system(stepped.system))[0])
 
     def stepped(self, name: str) -> Values:
         """Values of the mechanism with a complex step of one parameter."""
@@ -263,16 +287,31 @@ class EquationDerivatives:
         """Tables and work arrays of the state in complex numbers."""
         return complex_tables(self.state.c)
 
+    def _steps(self, count: int) -> np.ndarray:
+        """Zero steps: of positions, velocities, accelerations, time and controller states."""
+        return np.zeros((count, 3 * self.state.c.structure.nv + 1 + self.nz), complex)
+
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
         S, W = (
             self.complex_tables if system is None else (system, allocate_work(self.state.c.structure, system, complex))
         )
-        x = self.state
-        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
-        out = np.zeros((len(steps), self.width), complex)
-        evaluate_residuals(S, W, complex(x.t), y, vdot, lam, steps, out)
+        out = self.residuals(self.state, steps, S, W)
         if not np.isfinite(out.view(float)).all():
             raise self._not_finite(W.stack)
+        return out
+
+    def residuals(self, x: MechanismState, steps: np.ndarray, system: System, W: Work) -> np.ndarray:
+        """Residuals at steps from a state, by tables in complex numbers, (steps, width); without efforts."""
+        s = x.c.structure
+        if s.sampled:  # the laws of sampled states in place of their zero rates
+            laws = system.control_laws.copy()
+            for _, k, law, _ in s.sampled:
+                laws[k] = law
+            system = system._replace(control_laws=laws)
+        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
+        out = np.zeros((len(steps), self.width), complex)
+        evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, out)
+        out[:, self.at["s"]] *= -1.0
         return out
 
     def _not_finite(self, stack: np.ndarray) -> AnalysisError:
@@ -303,7 +342,7 @@ class EquationDerivatives:
         entries = np.zeros(len(rows))
         for first in range(0, groups, DIRECTIONS_PER_CALL):
             count = min(DIRECTIONS_PER_CALL, groups - first)
-            steps = np.zeros((count, 3 * nv + 1), complex)
+            steps = self._steps(count)
             mine = np.flatnonzero((group >= first) & (group < first + count))
             steps[group[mine] - first, what * nv + mine] = 1j * COMPLEX_STEP
             found = complex_step_derivative(self._run(steps))
@@ -375,7 +414,7 @@ def sparsity_pattern(s: Structure, S: System) -> Any:
     nb, nr, nm = len(S.tree.parent), len(s.rows), len(s.measured)
     body = np.repeat(np.arange(nb), S.tree.nv)
     of_row = [np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]]) for k in range(nr + nm)]
-    named = sorted({m % nm for m in s.slots.values()}) if s.slots else []
+    named = sorted({m % nm for m in s.slots.values() if m < 2 * nm})
     also = np.unique(np.concatenate([of_row[nr + m] for m in named])) if named else np.zeros(0, int)
     reach: list[tuple[np.ndarray, np.ndarray]] = [(np.arange(nb)[b : b + 1],) * 2 for b in range(nb)]
     reach += [(at, at) for at in of_row[:nr]]
@@ -402,7 +441,9 @@ def sparsity_pattern(s: Structure, S: System) -> Any:
     )
     expand = sp.csr_matrix((np.ones(len(body)), (body, np.arange(len(body)))), shape=(nb, len(body)))
     sensed, rows = lines[nr:], lines[:nr]
-    return sp.vstack([expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3]).astype(bool)
+    laws = sp.csr_matrix(np.tile(np.isin(body, also), (len(s.controls), 1)))
+    parts = [expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3, laws]
+    return sp.vstack(parts).astype(bool)
 
 
 def column_groups(touched: Any) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Nonsmooth points of forces: kinks, jumps and infinite slopes at the present state.
+"""Nonsmooth points of forces and of rates of controller states: kinks, jumps and infinite slopes at the present state.
 
 Examples are a rope at its free length, ``abs`` at zero and the corner of a table. A law is evaluated at a small offset
 on both sides of every quantity that it depends on, and at a tenth of that offset. A difference between the sides that
@@ -24,6 +24,7 @@ from ..model.expressions import Expression
 from ..model.force import CoordinateForce
 from ..model.model import Model
 from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative
+from .force_balance import state_sizes
 from .output_derivatives import curve_gradients, snapshot
 
 OFFSET = 1e-6  # relative to the mechanism's length, in radians, or these per second
@@ -41,7 +42,7 @@ LawFunction = Callable[[np.ndarray], complex]
 
 @dataclass(frozen=True)
 class NonsmoothPoint:
-    """Point where the law of a force or driver has two different slopes, or none.
+    """Point where the law of a force, driver or controller has two different slopes, or none.
 
     Attributes
     ----------
@@ -50,8 +51,8 @@ class NonsmoothPoint:
         Description of the law and of the point.
     jump : bool
         Whether the value itself is discontinuous or undefined.
-    along : ndarray (nv,), (nv,)
-        Gradient, by positions and velocities, of the quantity in which the law is not smooth.
+    along : ndarray (nv,), (nv,), (nz,)
+        Gradient, by positions, velocities and controller states, of the quantity in which the law is not smooth.
     by_parameter : bool
         Whether that quantity depends on a requested parameter.
     """
@@ -59,28 +60,31 @@ class NonsmoothPoint:
     element: str
     text: str
     jump: bool
-    along: tuple[np.ndarray, np.ndarray]
+    along: tuple[np.ndarray, np.ndarray, np.ndarray]
     by_parameter: bool
 
-    def is_crossed_by(self, dq: np.ndarray | None, dv: np.ndarray | None) -> bool:
-        """Whether any of the changes ``dq``, ``dv``, (nv, n) each, leads across the point; True if both are None."""
-        if dq is None or dv is None:
-            return self.by_parameter or bool(np.any(self.along))
-        ways = np.abs(self.along[0]) @ np.abs(dq) + np.abs(self.along[1]) @ np.abs(dv)
-        moved = np.abs(self.along[0] @ dq + self.along[1] @ dv)
+    def is_crossed_by(self, *changes: np.ndarray) -> bool:
+        """Whether any of n changes leads across the point.
+
+        The changes are those of positions (nv, n), velocities (nv, n) and, if given, controller states (nz, n). Without
+        any: whether any change at all does.
+        """
+        if not changes:
+            return self.by_parameter or any(np.any(part) for part in self.along)
+        pairs = list(zip(self.along, changes, strict=False))
+        ways = sum(np.abs(part) @ np.abs(d) for part, d in pairs)
+        moved = np.abs(sum(part @ d for part, d in pairs))
         return self.by_parameter or bool((moved > SLOPE_TOLERANCE * ways).any())
 
 
-def refuse_nonsmooth(
-    e: EquationDerivatives, dq: np.ndarray | None = None, dv: np.ndarray | None = None, to: Sequence[str] = ()
-) -> None:
-    """Refuse a state where a force has no derivative along given changes of state, or by a parameter.
+def refuse_nonsmooth(e: EquationDerivatives, *changes: np.ndarray, to: Sequence[str] = ()) -> None:
+    """Refuse a state where a force or rate has no derivative along given changes of state, or by a parameter.
 
     Parameters
     ----------
     e : EquationDerivatives
-    dq, dv : ndarray (nv, n)
-        Changes of positions and velocities; any change if not given.
+    *changes : ndarray
+        Changes of the state, as of `NonsmoothPoint.is_crossed_by`; any change if not given.
     to : sequence of str
         Parameters.
 
@@ -89,7 +93,7 @@ def refuse_nonsmooth(
     SingularityError
         With the names of the elements and the quantities in which they are not smooth.
     """
-    found = [k for k in nonsmooth_points(e, to) if k.is_crossed_by(dq, dv)]
+    found = [k for k in nonsmooth_points(e, to) if k.is_crossed_by(*changes)]
     if found:
         raise nonsmooth_error(found, e.state.t, "there are no linear equations")
 
@@ -107,7 +111,7 @@ def nonsmooth_error(found: Sequence[NonsmoothPoint], t: float, so: str) -> Singu
 
 
 def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[NonsmoothPoint]:
-    """Find all kinks and jumps of forces and drivers at a state.
+    """Find all kinks and jumps of forces, drivers and rates of controller states at a state.
 
     Parameters
     ----------
@@ -115,15 +119,19 @@ def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[Non
     to : sequence of str
         Parameters that count as arguments of the laws, too.
     """
+    states = [x.name for x in e.state.c.structure.controls]
     out: list[NonsmoothPoint] = []
     shot = None
-    for element, text, names, law in _force_and_driver_functions(e, to):
+    for element, text, names, law in (*_force_and_driver_functions(e, to), *_controller_functions(e, to)):
         shot = shot or snapshot(e.state)
         values = [("", np.array([_parameter_value(e, n)])) if n in to else shot.curve(n) for n in names]
         at = np.array([float(v[0]) for _, v in values])
         sizes = np.array([e.state.c.values.length if unit.startswith("m") else 1.0 for unit, _ in values])
-        for normal, what in nonsmooth_directions(law, at, sizes):
-            out.append(_nonsmooth_point(e, element, text, [*zip(names, at, values, strict=True)], normal, what, to))
+        for k, name in enumerate(names):
+            if name in states:
+                sizes[k] = state_sizes(e).change[states.index(name)]
+        of = [*zip(names, at, values, sizes.tolist(), strict=True)]
+        out += [_nonsmooth_point(e, element, text, of, *k, to) for k in nonsmooth_directions(law, at, sizes)]
     return out
 
 
@@ -205,9 +213,7 @@ def _force_and_driver_functions(
     """Yield the laws of forces and drivers: (element, title and law, names of the arguments, function)."""
     c = e.state.c
     s = c.structure
-    known = {name: complex(value) for name, value in s.model.environment(c.parameters).items()}
-    known["t"] = complex(e.state.t)
-    tables = {x.name: x for x in s.model.tables}
+    known, tables = _known_values(e)
     for d in s.model.drivers:
         of = LawOf(s.model.unit(d.coordinate, d))
         law = s.model.law(d.law, of, d.title, driver=True)
@@ -242,6 +248,25 @@ def _force_and_driver_functions(
                 yield force.name, text, [*names.values()], partial(_law_value, law, [*names], known, tables)
 
 
+def _known_values(e: EquationDerivatives) -> tuple[dict[str, complex], dict]:
+    """Parameters and time, and the tables of the model, by name."""
+    model = e.state.c.structure.model
+    known = {name: complex(value) for name, value in model.environment(e.state.c.parameters).items()}
+    return known | {"t": complex(e.state.t)}, {x.name: x for x in model.tables}
+
+
+def _controller_functions(
+    e: EquationDerivatives, to: Sequence[str]
+) -> Iterator[tuple[str, str, list[str], LawFunction]]:
+    """Yield the laws of the controller states, as `_force_and_driver_functions`."""
+    known, tables = _known_values(e)
+    for x in e.state.c.structure.controls:
+        if names := _law_arguments(e.state.c.structure.model, x.law, {}, to):
+            text = f"the law of {x.name!r}: '{x.controller.given().get(x.law.text, x.law.text)}'"
+            law = partial(_law_value, x.law, [*names], known, tables)
+            yield x.controller.name, text, [*names.values()], law
+
+
 def _law_arguments(model: Model, law: Expression, inputs: dict[str, str], to: Sequence[str]) -> dict[str, str]:
     """Arguments of a law besides time: name in the law -> curve (a parameter stands for itself)."""
     sensors = {x.name: f"{x.name}.value" for x in model.sensors}
@@ -272,23 +297,22 @@ def _nonsmooth_point(
     e: EquationDerivatives,
     element: str,
     text: str,
-    at: Sequence[tuple[str, float, tuple]],
+    at: Sequence[tuple[str, float, tuple, float]],
     normal: np.ndarray,
     what: str,
     to: Sequence[str],
 ) -> NonsmoothPoint:
     x, nv = e.state, len(e.state.v)
-    curves = [name for name, _, _ in at if name not in to]
-    sizes = np.array([x.c.values.length if unit.startswith("m") else 1.0 for _, _, (unit, _) in at])
-    weights = np.array([normal[k] / sizes[k] for k, (name, _, _) in enumerate(at) if name not in to])
+    curves = [name for name, *_ in at if name not in to]
+    weights = np.array([normal[k] / size for k, (name, _, _, size) in enumerate(at) if name not in to])
     by_all = curve_gradients(x, curves).T @ weights
-    along = by_all[:nv], by_all[nv : 2 * nv]
+    along = by_all[:nv], by_all[nv : 2 * nv], by_all[len(by_all) - e.nz :]
     where = ", ".join(
         f"{name} = {value + 0.0:.6g} {unit}".strip()
-        for (name, value, (unit, _)), n in zip(at, normal, strict=True)
+        for (name, value, (unit, _), _), n in zip(at, normal, strict=True)
         if abs(n) > SLOPE_TOLERANCE
     )
-    by = any(name in to and abs(n) > SLOPE_TOLERANCE for (name, _, _), n in zip(at, normal, strict=True))
+    by = any(name in to and abs(n) > SLOPE_TOLERANCE for (name, *_), n in zip(at, normal, strict=True))
     return NonsmoothPoint(element, f"{text} {what} at {where}", what not in (KINK, STEEP), along, by)
 
 

@@ -62,8 +62,9 @@ def curve_derivatives(
     x : MechanismState
     names : sequence of str
         Sensors, or curves of the result such as ``"slider.x"``.
-    d : four arrays (directions, nv), (.., nv), (.., nv), (.., multipliers)
-        Changes of positions along the velocities, of velocities, accelerations and multipliers.
+    d : arrays (directions, nv), (.., nv), (.., nv), (.., multipliers), (.., nz)
+        Changes of positions along the velocities, of velocities, accelerations and multipliers, and, if given, of
+        controller states.
     values : Values, optional
         The mechanism's values, already with a complex step of a parameter (for one direction).
     """
@@ -72,11 +73,11 @@ def curve_derivatives(
 
 
 def curve_gradients(x: MechanismState, names: Sequence[str]) -> Any:
-    """Derivatives of curves by all state variables, sparse (names, 3 nv + multipliers).
+    """Derivatives of curves by all state variables, sparse (names, 3 nv + multipliers + nz).
 
-    The columns are positions, velocities, accelerations, then multipliers and efforts. A curve depends on few of many
-    variables. They are found by bisection: groups of variables are tested along random directions, groups without
-    influence are dropped, the others are split.
+    The columns are positions, velocities, accelerations, multipliers and efforts, and controller states. A curve
+    depends on few of many variables. They are found by bisection: groups of variables are tested along random
+    directions, groups without influence are dropped, the others are split.
     """
     import scipy.sparse as sp
 
@@ -137,13 +138,19 @@ def curve_derivatives_over_time(
     return complex_step_derivative(np.array([r.curve(name)[1] for name in names])).T
 
 
-def _block_sizes(x: MechanismState) -> tuple[int, int, int, int]:
+def _block_sizes(x: MechanismState) -> tuple[int, ...]:
     n = len(x.v)
-    return n, n, n, len(x.lam) + len(x.c.structure.prescribed)
+    return n, n, n, len(x.lam) + len(x.c.structure.prescribed), len(x.c.structure.controls)
 
 
 def _result_at_state(
-    x: MechanismState, values: Values, dq: np.ndarray, dv: np.ndarray, da: np.ndarray, dlam: np.ndarray
+    x: MechanismState,
+    values: Values,
+    dq: np.ndarray,
+    dv: np.ndarray,
+    da: np.ndarray,
+    dlam: np.ndarray,
+    dz: np.ndarray | None = None,
 ) -> Result:
     """Result whose times are copies of the state, each with one of the changes."""
     n = len(dq)
@@ -152,6 +159,9 @@ def _result_at_state(
     first = values.structure.tables["tree"].v
     efforts = [x.effort[first[b]] for b in values.structure.prescribed.values()]
     z = np.repeat(x.z[None], n, axis=0)
+    if dz is not None and dz.shape[1]:
+        z = z.astype(dz.dtype)
+        z[:, : dz.shape[1]] += dz
     lam = np.r_[x.lam, efforts] + dlam
     health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)
     t = np.full(n, x.t)

@@ -1,15 +1,15 @@
 """Linear equations of motion in free coordinates, with the constraints eliminated.
 
 The parts of this module, in order: minimum-norm solutions of redundant equations; free coordinates (bases of the
-motions that constraints allow, with identity rows for the chosen coordinates); force balance (magnitude of the forces
-in each equation, and their rounding error: Vignes 1993); bounds of the rounding errors of coefficients (Parlett and
-Reinsch 1969; Watkins 2006); the reduction itself.
+motions that constraints allow, with identity rows for the chosen coordinates); bounds of the rounding errors of
+coefficients (Parlett and Reinsch 1969; Watkins 2006); the reduction itself.
 
 Let x be a change of position along the velocities, u a change of velocity, both seen from an evenly turning frame (see
-`steady_motion`), w the inputs. The perturbed kinematics, equations of motion and constraints at a state are
+`steady_motion`), z a change of the controller states, w the inputs. The perturbed kinematics, equations of motion,
+constraints and controllers at a state are
 
-    x' + H x = u + N x,    M (u' + H u) + D u + K x + r_w w = G^T l,
-    G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0
+    x' + H x = u + N x,    M (u' + H u) + D u + K x + R z + r_w w = G^T l,
+    G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0,    z' = s_x x + s_u u + s_z z + s_w w
 
 K contains the change of forces, inertia and *reactions* when positions change. Joint forces turn with the bodies, so K
 is not only the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out
@@ -19,22 +19,21 @@ of the equations along Zv. Joint friction depends on the reactions, adds F to -G
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..engine.kinematics import count_plain_coordinates, retract
+from ..engine.kinematics import retract
 from ..errors import ModelError, SingularityError
 from ..numerics.rank import RANK_TOLERANCE, column_space, fundamental_subspaces, null_space
 from ..numerics.sparse_rank import clearly_independent, null_basis
 from ..numerics.sparse_rank import sparse_matrix_rank as rank_of
 from ..tables.structure_definition import VelocityName, velocity_names
-from ..tables.table_definitions import with_numbers
-from .equation_derivatives import EquationDerivatives, MechanismState, refuse_undetermined_friction
+from .equation_derivatives import EquationDerivatives, refuse_undetermined_friction
+from .force_balance import force_magnitudes, state_sizes
 
 DENSE_UNKNOWNS = 400  # up to so many unknowns the solution uses singular values
 SINGULAR_VALUE_LIMIT = 1e-11  # singular values below this part of the largest count as zero
@@ -310,57 +309,6 @@ def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism)
     return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))
 
 
-PERTURBED_SAMPLES = 4
-PERTURBATION = 4.0 * np.finfo(float).eps  # relative perturbation of positions and multipliers
-ROUNDING_MARGIN = 8.0  # differences below so many times the spread of the samples are rounding
-
-
-def force_magnitudes(e: EquationDerivatives) -> np.ndarray:
-    """Magnitude of the forces in every equation of motion: total force plus each reaction, (nv,)."""
-    x, at = e.state, e.at
-    G = e.by_velocity[at["n"]]
-    M = e.by_acceleration[at["r"]]
-    force = e.residual[at["r"]] - M @ x.vdot + G.T @ x.lam
-    return np.abs(force) + abs(G).T @ np.abs(x.lam) + np.abs(x.effort)
-
-
-def force_rounding(e: EquationDerivatives) -> np.ndarray:
-    """Rounding error of every equation of motion, (nv,).
-
-    Constraints transmit rounding errors. Each equation therefore gets the largest error, as energy, of its connected
-    part of the mechanism.
-    """
-    size = e.state.c.sizes
-    spread = np.zeros(len(size))
-    for other in perturbed_states(e.state):
-        np.maximum(spread, np.abs(EquationDerivatives(other).block("r") - e.block("r")), out=spread)
-    part = _connected_parts(e)
-    most = np.zeros(len(size))
-    np.maximum.at(most, part, size * np.maximum(spread, PERTURBATION * force_magnitudes(e)))
-    return ROUNDING_MARGIN * most[part] / size
-
-
-def _connected_parts(e: EquationDerivatives) -> np.ndarray:
-    """Number of the connected part of the mechanism that each velocity belongs to, (nv,).
-
-    Two velocities are connected if a constraint can act on both, even if it does not in this position. An equation may
-    contain only a multiplier that is itself rounding; the forces connected to it give its magnitude.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    G, r = e.state.c.sparse_jacobian(), e.at["r"]
-    G.data[:] = 1.0
-    return connected_components(abs(e.by_position[r]) + abs(e.by_acceleration[r]) + G.T @ G, directed=False)[1]
-
-
-def stiffness_rounding(e: EquationDerivatives) -> list:
-    """Samples of the rounding error of the stiffness, sparse (nv, nv) each."""
-    K = e.by_position[e.at["r"]]
-    return [
-        ROUNDING_MARGIN * (EquationDerivatives(other).by_position[e.at["r"]] - K) for other in perturbed_states(e.state)
-    ]
-
-
 def static_equations(e: EquationDerivatives) -> EquationDerivatives:
     """Equations with zero accelerations, and the multipliers and efforts that balance the forces best."""
     import scipy.sparse as sp
@@ -377,49 +325,13 @@ def static_equations(e: EquationDerivatives) -> EquationDerivatives:
     return EquationDerivatives(replace(still, lam=y[: len(x.lam)], effort=prescribed_rows(c).T @ y[len(x.lam) :]))
 
 
-def is_balanced(e: EquationDerivatives, part: float) -> bool:
-    """Whether the residual of every equation is below ``part`` of its forces plus rounding."""
-    return is_balanced_beyond_rounding(e, part) or bool(
-        (np.abs(e.block("r")) <= part * force_magnitudes(e) + force_rounding(e)).all()
-    )
-
-
-def is_balanced_beyond_rounding(e: EquationDerivatives, part: float) -> bool:
-    """Like `is_balanced` without the rounding allowance, which is too large where a force jumps."""
-    return bool((np.abs(e.block("r")) <= part * force_magnitudes(e)).all())
-
-
-def unbalanced_fraction(e: EquationDerivatives) -> float:
-    """Largest residual relative to the forces of its equation; 0 where it is within rounding."""
-    left, acts = np.abs(e.block("r")), force_magnitudes(e)
-    return float(np.where(left > force_rounding(e), left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
-
-
-def perturbed_states(x: MechanismState) -> Iterator[MechanismState]:
-    """Yield copies of the state and the mechanism's values with random changes of the last digits."""
-    S = x.c.values.system
-    size = x.c.sizes
-    for b in range(len(S.tree.parent)):
-        q0, v0, n = int(S.tree.q[b]), int(S.tree.v[b]), count_plain_coordinates(S, b)
-        size[v0 : v0 + n] += np.abs(x.q[q0 : q0 + n])
-    rng = np.random.default_rng(0)
-    for _ in range(PERTURBED_SAMPLES):
-        digits = partial(rng.uniform, -PERTURBATION, PERTURBATION)
-        q = x.q.copy()
-        retract(S, q, size * digits(size=len(size)))
-        v, vdot, lam, effort = (a * (1.0 + digits(size=len(a))) for a in (x.v, x.vdot, x.lam, x.effort))
-        rounded = with_numbers(S, lambda _, a: np.where(a == np.rint(a), a, a * (1.0 + digits(size=a.shape))))  # noqa: B023
-        c = replace(x.c, values=replace(x.c.values, system=rounded))
-        yield replace(x, c=c, q=q, v=v, vdot=vdot, lam=lam, effort=effort)
-
-
 COEFFICIENT_ROUNDING = 2e-14  # uncertainty of coefficients, relative to the largest term of the equation
 DIRECTION_ROUNDING = 1e-15  # the same, relative to the largest term of all equations of the same bodies
 SLOWEST_FRACTION = 1e-3  # lower bound of the fastest rate, relative to the rate that the uncancelled terms would give
 
 
 class TermSizes(NamedTuple):
-    """Magnitudes of the terms whose sums are the coefficients; n coordinates and velocities, p columns.
+    """Magnitudes of the terms whose sums are the coefficients, p columns.
 
     Attributes
     ----------
@@ -429,6 +341,8 @@ class TermSizes(NamedTuple):
         Terms in the rates of the free coordinates.
     forces : ndarray (nv, p)
         Terms in the equations of motion.
+    states : ndarray (nz, p)
+        Terms in the rates of the controller states.
     Y, M : ndarray (nv, fv), (nv, nv)
         Directions along which the multipliers drop out; mass matrix.
     """
@@ -436,6 +350,7 @@ class TermSizes(NamedTuple):
     mass: np.ndarray
     rates: np.ndarray
     forces: np.ndarray
+    states: np.ndarray
     Y: np.ndarray
     M: np.ndarray
 
@@ -451,9 +366,9 @@ def remove_rounding(
     terms: TermSizes,
     a_dot: np.ndarray,
     forces: np.ndarray,
+    rates: np.ndarray,
     e: EquationDerivatives,
     f: FreeCoordinates,
-    speed_scales: np.ndarray | None = None,
 ) -> MatrixUncertainty:
     """Set coefficients within rounding to 0 and return the uncertainty of the others.
 
@@ -469,43 +384,42 @@ def remove_rounding(
         Rates of the free coordinates.
     forces : ndarray (fv, p)
         Forces along the directions in which the multipliers drop out.
-    speed_scales : ndarray (nv,), optional
-        Large speeds of auxiliary bodies, whose velocities stand for other quantities; 0 for all others.
+    rates : ndarray (nz, p)
+        Rates of the controller states.
     """
-    (a, fv), nv = (len(a_dot), len(forces)), len(f.scale)
-    n = a + fv
+    a, fv, nv = len(a_dot), len(forces), len(f.scale)
+    m = a + fv
+    n = m + len(rates)
     scale, along = np.r_[f.scale[f.chosen], f.scale[f.chosen_v]], np.abs(terms.Y).T
     inertia = np.sqrt(np.maximum(np.abs(np.diag(terms.mass)), 1e-300))
     terms.mass[np.abs(terms.mass) <= COEFFICIENT_ROUNDING * np.outer(inertia, inertia)] = 0.0
     inverse = np.linalg.inv(terms.mass) if fv else terms.mass
     turned = _coupled_maximum(force_magnitudes(e), terms.M, e, f.scale)  # change of the forces by a rotation of 1 rad
-    unit = scale.copy()
-    large = np.zeros(fv) if speed_scales is None else speed_scales[f.chosen_v]
+    unit = np.r_[scale, state_sizes(e).change if e.nz else np.zeros(0)]
     if fv:
-        A = np.abs(inverse @ forces[:, :n]) / scale[a:, None] * scale
-        most = np.hstack([along @ terms.forces[:, :n] * scale, (along @ turned)[:, None]])
-        moves = np.r_[np.ones(a, bool), large == 0.0]
+        A = np.abs(inverse @ forces[:, :n]) / scale[a:, None]
+        most = np.hstack([along @ terms.forces[:, :m] * scale, (along @ turned)[:, None]])
         uncancelled = most / inertia[:, None] ** 2 / scale[a:, None]
-        pushed = float((A[moves[a:]][:, ~moves] / scale[~moves] * large[large > 0.0]).max(initial=0.0))
-        fastest = _fastest_rate(A[moves[a:]][:, moves], uncancelled[moves[a:]][:, np.r_[moves, True]], a, pushed)
-        unit[a:] = np.where(large > 0.0, large, fastest * unit[a:])
+        unit[a:m] *= _fastest_rate(A[:, :m] * scale, uncancelled, a, float((A[:, m:] * unit[m:]).max(initial=0.0)))
     rows = (terms.forces[:, :n] * unit).max(axis=1, initial=0.0) if n else np.zeros(nv)
-    first = COEFFICIENT_ROUNDING * (terms.rates[:, :n] * unit).max(axis=1, initial=0.0)
+    first, last = (
+        COEFFICIENT_ROUNDING * (part[:, :n] * unit).max(axis=1, initial=0.0) for part in (terms.rates, terms.states)
+    )
     second = along @ (
         COEFFICIENT_ROUNDING * rows + DIRECTION_ROUNDING * (_coupled_maximum(rows, terms.M, e, f.scale) + turned)
     )
-    size = np.r_[first, second][:, None] / unit
-    for own, least in ((a_dot[:, :n], size[:a]), (forces[:, :n], size[a:])):
+    size = np.r_[first, second, last][:, None] / unit
+    for own, least in ((a_dot[:, :n], size[:a]), (forces[:, :n], size[a:m]), (rates[:, :n], size[m:])):
         own[np.abs(own) <= least] = 0.0
     by = np.eye(n)
-    by[a:, a:] = inverse
+    by[a:m, a:m] = inverse
     return MatrixUncertainty(by, size)
 
 
 def _fastest_rate(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float) -> float:
     """Rate [1/s] of the fastest motion, from accelerations and their uncancelled terms (fv, n), in natural units.
 
-    ``pushed`` is the largest acceleration caused by auxiliary bodies; if nothing else acts, the rest is rounding.
+    ``pushed`` is the largest acceleration caused by controller states; if nothing else acts, the rest is rounding.
     """
 
     def rate(by_position: np.ndarray, by_velocity: np.ndarray) -> float:
@@ -552,27 +466,36 @@ class TurningFrame:
 
 @dataclass
 class InputTerms:
-    """Derivatives of the equations by m inputs at a fixed state: r_w (nv, m), g_w (holonomic, m), n_w (rows, m)."""
+    """Derivatives of the equations by m inputs at a fixed state.
+
+    r_w (nv, m), g_w (holonomic, m), n_w (rows, m), s_w (nz, m).
+    """
 
     r: np.ndarray
     g: np.ndarray
     n: np.ndarray
+    s: np.ndarray
 
 
 @dataclass
 class ReducedEquations:
-    """Linear equations in the changes s = (a, b) of the free coordinates and velocities, and the inputs.
+    """Linear equations in the changes y = (a, b, z) of free coordinates, velocities and controller states, and inputs.
 
-    The columns of every array belong to s (n), the inputs, and their first and second rates (m each).
+    The columns of every array belong to y (n), the inputs, and their first and second rates (m each).
 
     Attributes
     ----------
     rate : ndarray (n, n + 3 m)
-        s' as a linear function of s and the inputs.
-    position, velocity, acceleration, multipliers : ndarray
-        Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
+        y' as a linear function of y and the inputs.
+    position, velocity, acceleration, multipliers, states : ndarray
+        Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates, and
+        controller states.
+    laws : ndarray (nz, n + 3 m)
+        Changes of the rates of the controller states; for sampled ones of the values from the next instant on.
+    changes : ndarray (nz,)
+        Large changes of the controller states.
     M, D, K : ndarray (f, f) or None
-        Matrices of M a'' + D a' + K a = 0; None unless all constraints are on positions.
+        Matrices of M a'' + D a' + K a = 0; None unless all constraints are on positions and there are no states z.
     uncertainty : MatrixUncertainty
         Uncertainty of A due to rounding.
     """
@@ -582,6 +505,9 @@ class ReducedEquations:
     velocity: np.ndarray
     acceleration: np.ndarray
     multipliers: np.ndarray
+    states: np.ndarray
+    laws: np.ndarray
+    changes: np.ndarray
     M: np.ndarray | None = None
     D: np.ndarray | None = None
     K: np.ndarray | None = None
@@ -598,38 +524,24 @@ class ReducedEquations:
 
 
 def reduced_equations(
-    e: EquationDerivatives,
-    f: FreeCoordinates,
-    frame: TurningFrame,
-    w: InputTerms | None = None,
-    speed_scales: np.ndarray | None = None,
+    e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame, w: InputTerms | None = None
 ) -> ReducedEquations:
-    """Eliminate the constraints; ``speed_scales`` is as in `remove_rounding`.
+    """Eliminate the constraints.
 
     Raises
     ------
     ModelError
         If a free motion has no inertia.
     """
-    r, nv = e.at["r"], len(f.scale)
+    r, nv, free = e.at["r"], len(f.scale), f.Z.shape[1] + f.Zv.shape[1] + e.nz
     M, D, K = (X[r].toarray() for X in (e.by_acceleration, e.by_velocity, e.by_position))
     H, N = frame.H, frame.N
-    given = len(f.rows) - e.block("n").size
-    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((given, nv))])
-    w = w or InputTerms(np.zeros((nv, 0)), np.zeros((len(f.holonomic), 0)), np.zeros((len(f.rows), 0)))
+    w = w or InputTerms(*(np.zeros((n, 0)) for n in (nv, len(f.holonomic), len(f.rows), e.nz)))
     none = np.zeros_like(w.r)
-    rates = np.zeros((len(f.rows), w.g.shape[1]))
-    rates[f.on_positions] = w.g
-    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.left)
-    P, U, U1 = (
-        f.unseen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
-        for b in (V @ f.Z, V @ X + w.n, rates)
-    )
-    x = np.hstack([f.Z, np.zeros_like(f.Zv), X, none, none])
-    u = np.hstack([P, f.Zv, U, U1, none])
+    x, u, P, by_inputs = _constrained_motions(e, f, w)
     a_dot = f.left @ (u + (N - H) @ x)
-    known = P @ a_dot + np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), none, U, U1])
-    acting = np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), w.r, none, none])
+    known = P @ a_dot + np.hstack([np.zeros((nv, free)), none, *by_inputs])
+    acting = np.hstack([np.zeros((nv, free - e.nz)), e.by_state[r], w.r, none, none])
     others = (M @ H + D) @ u + K @ x + acting
     by_multipliers = -f.rows.T
     Y = f.Zv
@@ -637,10 +549,12 @@ def reduced_equations(
         by_multipliers[:, : e.block("n").size] += e.by_reactions
         Y = _multiplier_free_directions(e, f)
     size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
-    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, Y, M)
-    forces = Y.T @ (M @ known + others)
+    size[:, free - e.nz : free] += abs(e.by_state[r])
+    z, laws, law_terms = _controller_equations(e, x, u, w)
+    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, law_terms, Y, M)
+    forces, rates = Y.T @ (M @ known + others), np.where(e.sampled[:, None], 0.0, laws)
     try:
-        doubt = remove_rounding(terms, a_dot, forces, e, f, speed_scales)
+        doubt = remove_rounding(terms, a_dot, forces, rates, e, f)
     except np.linalg.LinAlgError:
         d = f.chosen_v[int(np.argmin(np.abs(np.diag(terms.mass))))]
         raise massless_motion_error(f.names[d].name) from None
@@ -648,13 +562,45 @@ def reduced_equations(
     acceleration = f.Zv @ b_dot + known + H @ u
     left = M @ (acceleration - H @ u) + others
     multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
-    out = ReducedEquations(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers, uncertainty=doubt)
-    if f.Zv.shape == f.Z.shape:
+    rate, changes = np.vstack([a_dot, b_dot, rates]), state_sizes(e).change if e.nz else np.zeros(0)
+    out = ReducedEquations(rate, x, u, acceleration, multipliers, z, laws, changes, uncertainty=doubt)
+    if f.Zv.shape == f.Z.shape and not e.nz:
         turned = (H - N) @ f.Z  # u = Z a' + turned a
         out.M = terms.mass
         out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
         out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
     return out
+
+
+def _constrained_motions(
+    e: EquationDerivatives, f: FreeCoordinates, w: InputTerms
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Changes x and u that keep the constraints, P, and (U, U1); see the module."""
+    nv, given = len(f.scale), len(f.rows) - e.block("n").size
+    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((given, nv))])
+    none, states = np.zeros_like(w.r), np.zeros((nv, e.nz))
+    rates = np.zeros((len(f.rows), w.g.shape[1]))
+    rates[f.on_positions] = w.g
+    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.left)
+    P, U, U1 = (
+        f.unseen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
+        for b in (V @ f.Z, V @ X + w.n, rates)
+    )
+    x = np.hstack([f.Z, np.zeros_like(f.Zv), states, X, none, none])
+    return x, np.hstack([P, f.Zv, states, U, U1, none]), P, (U, U1)
+
+
+def _controller_equations(
+    e: EquationDerivatives, x: np.ndarray, u: np.ndarray, w: InputTerms
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Changes of the controller states, of their laws, and magnitudes of the terms of these."""
+    s, m = e.at["s"], w.s.shape[1]
+    z = np.zeros((e.nz, x.shape[1]))
+    z[:, x.shape[1] - 3 * m - e.nz : x.shape[1] - 3 * m] = np.eye(e.nz)
+    S, T, Z = e.by_position[s].toarray(), e.by_velocity[s].toarray(), e.by_state[s]
+    laws = S @ x + T @ u + Z @ z
+    laws[:, x.shape[1] - 3 * m : x.shape[1] - 2 * m] += w.s
+    return z, laws, abs(S) @ abs(x) + abs(T) @ abs(u) + abs(Z) @ z
 
 
 def massless_motion_error(name: str) -> ModelError:

@@ -24,14 +24,8 @@ from ..results.wording import tuple_text
 from ..tables.structure_definition import velocity_names
 from ..tables.table_definitions import System
 from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState, complex_step_derivative
-from .reduced_equations import (
-    FreeCoordinates,
-    TurningFrame,
-    force_magnitudes,
-    force_rounding,
-    reduced_equations,
-    static_equations,
-)
+from .force_balance import force_magnitudes, residual_rounding, state_sizes
+from .reduced_equations import FreeCoordinates, TurningFrame, reduced_equations, static_equations
 
 TURNING_TOLERANCE = 1e-9  # singular values below this part of the largest leave the frame's rotation undetermined
 IN_PLANE = (0, 1, 5)  # indices of x, y and the angle about z among the six coordinates of a body
@@ -159,6 +153,9 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
     size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
     if not np.abs((x.vdot - frame.H @ x.v) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
         return False  # the velocities do not just turn with the frame
+    changes = continuous_rates(e) / state_sizes(e).change if e.nz else np.zeros(0)
+    if not np.abs(changes).max(initial=0.0) <= COEFFICIENT_TOLERANCE * np.sqrt(size):
+        return False
     tau, later = _advanced_state(x, frame)
     T = expm(tau * frame.H)
     if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
@@ -183,10 +180,13 @@ def is_still(x: MechanismState) -> bool:
     return not (np.abs(x.v) / scale).max(initial=0.0) > REST_SPEED * given
 
 
-def steady_frame(
-    x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, speed_scales: np.ndarray | None = None
-) -> TurningFrame:
-    """Frame in which the state is steady, the world at an equilibrium; ``speed_scales`` as in `refuse_unbalanced`.
+def continuous_rates(e: EquationDerivatives) -> np.ndarray:
+    """Rates of the controller states between the instants at which they are sampled, (nz,)."""
+    return np.where(e.sampled, 0.0, e.state_rates)
+
+
+def steady_frame(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates) -> TurningFrame:
+    """Frame in which the state is steady, the world at an equilibrium.
 
     Raises
     ------
@@ -194,10 +194,10 @@ def steady_frame(
         If the state is neither an equilibrium nor a steady motion. The message names an unbalanced acceleration.
     """
     none = np.zeros((len(x.v),) * 2)
-    if not f.Zv.shape[1]:  # drivers prescribe the whole motion
+    if not f.Zv.shape[1] and not e.nz:  # drivers prescribe the whole motion
         return TurningFrame(np.zeros(3), none, none)
     if is_still(x):
-        refuse_unbalanced(x, e, speed_scales)
+        refuse_unbalanced(x, e)
         at_rest = TurningFrame(np.zeros(3), none, none)
         if has_time_laws(x.c.values.system):
             _refuse_time_dependence(x, e, f, at_rest)
@@ -212,25 +212,25 @@ def steady_frame(
     )
 
 
-def refuse_unbalanced(x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None) -> None:
+def refuse_unbalanced(x: MechanismState, e: EquationDerivatives) -> None:
     """Refuse a state at rest that is not an equilibrium.
-
-    Parameters
-    ----------
-    x : MechanismState
-    e : EquationDerivatives
-        The equations at the state.
-    speed_scales : ndarray (nv,), optional
-        Large speeds of auxiliary bodies, whose velocities stand for other quantities; they widen the tolerance.
 
     Raises
     ------
     AnalysisError
-        With the name of the velocity with the largest acceleration.
+        With the name of the controller state that changes most, or of the velocity with the largest acceleration.
     """
-    left = remaining_accelerations(x, e, speed_scales)
+    left = _remaining_rates(x, e)
     if not left.any():
         return
+    nv = len(x.v)
+    if left[nv:].any():
+        k = int(np.argmax(left[nv:]))
+        raise AnalysisError(
+            f"the controllers are not in equilibrium where the mechanism is: {rate_description(e, k)}. Find an "
+            f"equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that "
+            f"has settled"
+        )
     names, d = velocity_names(x.c.structure), int(np.argmax(left))
     raise AnalysisError(
         f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
@@ -239,23 +239,30 @@ def refuse_unbalanced(x: MechanismState, e: EquationDerivatives, speed_scales: n
     )
 
 
-def remaining_accelerations(
-    x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None
-) -> np.ndarray:
-    """Unbalanced accelerations (nv,) in natural units, zero where balanced; arguments as in `refuse_unbalanced`."""
-    rest = static_equations(e)
-    left = np.abs(rest.block("r"))
-    may = BALANCE_TOLERANCE * force_magnitudes(rest) + POSITION_TOLERANCE * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
-    if speed_scales is not None:
-        may += POSITION_TOLERANCE * (abs(e.by_velocity[e.at["r"]]) @ speed_scales)
-    if (left <= may).all() or (left <= may + force_rounding(rest)).all():
+def rate_description(e: EquationDerivatives, k: int) -> str:
+    """Text that describes how a controller state changes."""
+    x, rate = e.state.c.structure.controls[k], e.state_rates[k]
+    if x.controller.sampled:
+        return f"the next sample changes {x.name!r} by {rate:.3g}"
+    return f"{x.name!r} changes by {rate:.3g} in a second"
+
+
+def _remaining_rates(x: MechanismState, e: EquationDerivatives) -> np.ndarray:
+    """Unbalanced accelerations, and rates of controller states, (nv + nz,) in natural units, zero where balanced."""
+    rest, r, s = static_equations(e), e.at["r"], e.at["s"]
+    change = state_sizes(e).change if e.nz else np.zeros(0)
+    left = np.abs(np.r_[rest.block("r"), continuous_rates(rest)])
+    may = np.r_[BALANCE_TOLERANCE * force_magnitudes(rest), np.zeros(e.nz)]
+    may += POSITION_TOLERANCE * np.r_[abs(e.by_position[r]) @ x.c.sizes, abs(e.by_position[s]) @ x.c.sizes]
+    may += POSITION_TOLERANCE * np.r_[abs(e.by_state[r]) @ change, abs(e.state_jacobian) @ change]
+    if (left <= may).all() or (left <= may + residual_rounding(rest)).all():
         return np.zeros(len(left))
-    return np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)
+    return np.where(left > may, np.r_[np.abs(x.vdot) * x.c.sizes, left[len(x.v) :] / change], 0.0)
 
 
 def has_time_laws(S: System) -> bool:
-    """Whether a force law depends on time."""
-    for law in S.forces.laws.ravel().tolist():
+    """Whether a law of a force or a controller depends on time."""
+    for law in [*S.forces.laws.ravel().tolist(), *S.control_laws.tolist()]:
         if law >= 0:
             program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
             if (program == (INPUT, 0)).all(axis=1).any():

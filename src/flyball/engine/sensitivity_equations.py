@@ -1,15 +1,17 @@
 """Variational equations: the motion and its derivatives with respect to parameters, integrated together.
 
-    dq' = dv + N dq,  [M G^T; G 0] [dvdot; -dlam] = -[dr; da];  works change with the powers
+    dq' = dv + N dq,  [M G^T; G 0] [dvdot; -dlam] = -[dr; da];  dc' = ds;  works change with the powers
 
-dr and da are the changes of the equations of motion and of the constraints along (dq, dv, dp), by a complex step of the
+dr, da and ds are the changes of the equations of motion, the constraints and the rates of the controller states c along
+(dq, dv, dc, dp), by a complex step of the
 residual; the solve uses the motion's own factor. Joint friction depends on the reactions, so dr has a part F dlam: the
 columns of F are found by a complex step of each multiplier that loads a joint, and taken into account by as many
 additional unknowns (Woodbury).
 
 After every step motion and changes are projected on their constraints. The steps suit both, to the same tolerance.
 (Direct differentiation: Haug and Ehle 1982; Chang and Nikravesh 1985. That the changes may be projected like this, see
-Serban and Freeman 1996.) The state is (q, v, all (dq, dv), z, all dz). This loop does not contain the right-hand side:
+Serban and Freeman 1996.) The state is (q, v, all (dq, dv), c, all dc, w, all dw) with
+the controller states c and the other states w. This loop does not contain the right-hand side:
 it calls the kernels of the engine and of the residual by address.
 """
 
@@ -53,13 +55,13 @@ COMPLEX_STEP = 1e-40  # relative to the parameter
 # places in the argument tuple of the loop, behind those of the engine's call
 RESIDUAL, SC_, WC_, BATCH = range(6, 10)
 # entries of SensitivityPlan.size
-NQ, NZ, COUNT, POWERS = range(4)
+NQ, NZ, COUNT, POWERS, CONTROLS = range(5)
 
 
 class SensitivityPlan(NamedTuple):
     """Table entries that each parameter changes, and workspace."""
 
-    size: Int1  # (4,) coordinates, states, parameters; whether powers replace works
+    size: Int1  # (5,) coordinates, states, parameters; whether powers replace works; controller states
     first: Int1  # (n + 1,) first entry of each parameter
     entry: Int1  # (entries,): index in the tables
     step: Float1  # (entries,): imaginary step of the entry
@@ -67,7 +69,9 @@ class SensitivityPlan(NamedTuple):
     found: Float2  # (n, nv + nr + nv): changes of accelerations, multipliers, efforts
     effort: Float1  # (nv,) of the motion itself
     rate: Float1  # rates of the state, for rows of output
+    rates: Float1  # (nz,): changes of the rates of the states with one parameter
     zero: Float1  # (nv,)
+    still: Float1  # (nc,): zeros
     pressing: Int1  # (m,) rows whose multipliers load some friction
     friction_response: Float2  # (m, nv + nr + nv): response to the change of friction per unit of each multiplier
     friction_power: Float2  # (m, nz): the same of the powers
@@ -96,13 +100,15 @@ def set_reference_state(A, P, t, state):
 
 
 @formula
-def complex_step_residual(A, dq, dv, task):
-    """Residuals with a complex step of positions and velocities, and of the entries in the tables."""
+def complex_step_residual(A, dq, dv, dc, task):
+    """Residuals with a complex step of positions, velocities, controller states, and of the entries in the tables."""
     B = A[BATCH]
     nv = dq.shape[0]
     for d in range(nv):
         B.steps[0, d] = complex(0.0, COMPLEX_STEP * dq[d])
         B.steps[0, nv + d] = complex(0.0, COMPLEX_STEP * dv[d])
+    for c in range(dc.shape[0]):
+        B.steps[0, 3 * nv + 1 + c] = complex(0.0, COMPLEX_STEP * dc[c])
     if nv > 0:
         B.out[0, 0] = complex(np.nan, np.nan)  # entries that are not computed are nan
     call(A[RESIDUAL], A[SC_], A[WC_], B, B, B, task)
@@ -121,7 +127,7 @@ def project_change(A, P, k, dq, dv):
     nv, nr, nq = dq.shape[0], S.rows.law.shape[0], P.size[NQ]
     set_parameter_step(P, k, True)
     for what in range(2):
-        complex_step_residual(A, dq, dv, CONSTRAINT_GAPS)
+        complex_step_residual(A, dq, dv, P.still, CONSTRAINT_GAPS)
         for b in range(S.tree.parent.shape[0]):
             if S.tree.law[b] >= 0:
                 dq[S.tree.v[b]] = WC.y[0, S.tree.q[b]].imag / COMPLEX_STEP
@@ -141,20 +147,21 @@ def project_change(A, P, k, dq, dv):
 
 
 @formula
-def state_change(A, P, k, dq, dv, rate, powers):
-    """Rates (2 nv,) of the changes of positions and velocities with parameter k, and changes (nz,) of powers.
+def state_change(A, P, k, dq, dv, dc, rate, powers):
+    """Rates (2 nv,) of the changes of positions and velocities with parameter k, and changes (nz,) of states' rates.
 
-    Changes of accelerations, multipliers and efforts go to ``P.found[k]``.
+    ``dc`` are the changes of the controller states. Changes of accelerations, multipliers and efforts go to
+    ``P.found[k]``.
     """
     S, W, WC = A[S_], A[W_], A[WC_]
     nv, nr = dq.shape[0], S.rows.law.shape[0]
     found = P.found[k]
     set_parameter_step(P, k, True)
-    complex_step_residual(A, dq, dv, RESIDUAL_DRIVEN)
+    complex_step_residual(A, dq, dv, dc, RESIDUAL_DRIVEN)
     set_parameter_step(P, k, False)
     solve_change(A, P, found, 1.0)
     for i in range(powers.shape[0]):
-        powers[i] = 0.0
+        powers[i] = WC.y[1, i].imag / COMPLEX_STEP if i < dc.shape[0] else 0.0
     for f in range(S.forces.F.shape[0]):
         if S.forces.work[f] >= 0:
             powers[S.forces.work[f]] = WC.y[1, S.forces.work[f]].imag / COMPLEX_STEP
@@ -211,7 +218,7 @@ def friction_responses(A, P):
     for j in range(P.pressing.shape[0]):
         r = P.pressing[j]
         B.lam[r] = complex(W.rows.multiplier[r], COMPLEX_STEP)
-        complex_step_residual(A, P.zero, P.zero, RESIDUAL_STEPS)
+        complex_step_residual(A, P.zero, P.zero, P.still, RESIDUAL_STEPS)
         B.lam[r] = complex(W.rows.multiplier[r], 0.0)
         for e in range(S.row_start[r], S.row_start[r + 1]):  # without the reaction's own effect
             B.out[0, S.column[e]] += complex(0.0, COMPLEX_STEP * W.G[e])
@@ -265,13 +272,21 @@ def solve_in_place(A):
 
 
 @formula
+def state_place(P, k, i):
+    """Place of state i in the state vector: of the motion (k = 0), or of its change with parameter k - 1."""
+    n, controls = P.size[COUNT], P.size[CONTROLS]
+    at = P.size[NQ] + P.zero.shape[0] + 2 * P.zero.shape[0] * n
+    if i < controls:
+        return at + k * controls + i
+    return at + (n + 1) * controls + k * (P.size[NZ] - controls) + i - controls
+
+
+@formula
 def copy_motion_part(x, y, P, out):
     """Copy the motion's part of a state vector (or of its rates) ``y`` to ``x``; back if ``out``."""
-    nv = P.zero.shape[0]
-    own = P.size[NQ] + nv
-    more = 2 * nv * P.size[COUNT]
+    own = P.size[NQ] + P.zero.shape[0]
     for i in range(x.shape[0]):
-        j = i if i < own else i + more
+        j = i if i < own else state_place(P, 0, i - own)
         if out:
             y[j] = x[i]
         else:
@@ -281,14 +296,15 @@ def copy_motion_part(x, y, P, out):
 @formula
 def change_rates(y, dy, A, P):
     """Rates of all changes at the base state of the residual batch."""
-    nv, nz, n = P.zero.shape[0], P.size[NZ], P.size[COUNT]
-    at = P.size[NQ] + nv
-    works = at + 2 * nv * n + nz
+    nv = P.zero.shape[0]
     friction_responses(A, P)
-    for k in range(n):
-        a = at + 2 * nv * k
-        b = works + nz * k
-        state_change(A, P, k, y[a : a + nv], y[a + nv : a + 2 * nv], dy[a : a + 2 * nv], dy[b : b + nz])
+    for k in range(P.size[COUNT]):
+        a = P.size[NQ] + nv + 2 * nv * k
+        c = state_place(P, k + 1, 0)
+        dc = y[c : c + P.size[CONTROLS]]
+        state_change(A, P, k, y[a : a + nv], y[a + nv : a + 2 * nv], dc, dy[a : a + 2 * nv], P.rates)
+        for i in range(P.rates.shape[0]):
+            dy[state_place(P, k + 1, i)] = P.rates[i]
 
 
 @formula
@@ -369,7 +385,6 @@ def report_augmented_state(t, y, out, A, P):
     rate = P.rate
     project_changes(t, y, rate, A, P)
     at = P.size[NQ] + nv
-    works = at + 2 * nv * n + nz
     to = width
     for k in range(n):
         for i in range(2 * nv):
@@ -379,7 +394,7 @@ def report_augmented_state(t, y, out, A, P):
             out[to + i] = P.found[k, i]
         to += P.found.shape[1]
         for i in range(nz):
-            j = works + nz * k + i
+            j = state_place(P, k + 1, i)
             out[to + i] = rate[j] if P.size[POWERS] == 1 else y[j]
         to += nz
     return status

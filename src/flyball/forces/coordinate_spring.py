@@ -113,11 +113,6 @@ class Actuator(CoordinateForce):
         return (self.force,)
 
 
-def law_actuator(name: str, coordinate: str, force: str) -> Actuator:
-    """Return a force along a coordinate by a law."""
-    return Actuator(name, coordinate, force=force)
-
-
 def refuse_without_stiffness(e: Any, name: str, usual: float | None) -> None:
     """Refuse a field that has no effect on a spring without stiffness.
 

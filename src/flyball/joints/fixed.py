@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..constraints.blocks import COMMON_POINT, SAME_AXES
 from ..model.element import element
@@ -27,8 +27,3 @@ class Fixed(Joint):
     symbol: ClassVar[str] = "fixed"
     replaceable: ClassVar[bool] = True
     omission: ClassVar[float] = 1.5
-
-
-def weld_to_ground(name: str, body: str, at: Any) -> Fixed:
-    """Return a joint that fixes a body in its drawn pose."""
-    return Fixed(name, "ground", body, at=at)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..constraints.blocks import SAME_AXES, SLIDE, STRAIGHT_LINE
 from ..model.element import Length, element
@@ -35,8 +35,3 @@ class Prismatic(Joint):
     planar_normal: ClassVar[str] = "y"
     symbol: ClassVar[str] = "prismatic"
     replaceable: ClassVar[bool] = True
-
-
-def slide_from_ground(name: str, body: str, at: Any, planar: bool) -> Prismatic:
-    """Return a slide along x, from ground to a body."""
-    return Prismatic(name, "ground", body, at=at, axis=(1, 0) if planar else (1, 0, 0))

@@ -9,7 +9,7 @@ in absolute coordinates. They are refused in the same cases as by `linearize`, w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -57,10 +57,11 @@ def values_with_input_step(e: EquationDerivatives, i: Input) -> Values:
     return e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
 
 
-def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of the equations of motion, of all constraints, and of their velocity form by the inputs.
+def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, ...]:
+    """Derivatives by the inputs.
 
-    Shapes: (nv, inputs), then twice (rows and prescribed coordinates, inputs).
+    Of the equations of motion (nv, inputs), of all constraints and of their velocity form (rows and prescribed
+    coordinates, inputs), and of the laws of controller states (nz, inputs).
     """
     by, g, n = [], [], []
     for i in inputs:
@@ -72,7 +73,7 @@ def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.n
     W = np.array(by).reshape(len(inputs), e.width).T
     prescribed = len(e.state.c.structure.prescribed)
     given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
-    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates])
+    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates]), W[e.at["s"]]
 
 
 # Up to so many velocities and freedoms the constraints are eliminated and the matrices are dense.
@@ -98,6 +99,7 @@ def uses_sparse_equations(x: MechanismState, free: int) -> bool:
     many = exceeds_dense_size(
         DENSE_VELOCITIES if s.loads else free, s.nv, len(s.rows)
     )  # joint friction is implemented in the dense equations only
+    many = many and not s.controls  # these, too
     return many and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
 
 
@@ -180,7 +182,7 @@ class SparseEquations:
         """Refuse kinks of forces that a free motion crosses."""
         found = []
         for k in nonsmooth_points(self.e, to):
-            ways = [self.scale**2 * part for part in k.along]  # steepest direction, in scaled units
+            ways = [self.scale**2 * part for part in k.along[:2]]  # steepest direction, in scaled units
             dq, dv = (self.freed(way) for way in ways)
             if k.is_crossed_by(np.stack([dq, 0.0 * dq], 1), np.stack([0.0 * dv, dv], 1)):
                 found.append(k)
@@ -308,7 +310,7 @@ def _assembled_descriptor(
     G = _all_rows(e)
     others = G.shape[0] - len(s.rows)
     holonomic = np.r_[[r.holonomic for r in s.rows], np.ones(others, bool)].astype(bool)
-    r, g, n = input_effects(e, inputs)
+    r, g, n, s_w = input_effects(e, inputs)
     gaps = np.where(holonomic[: len(g), None], g, n)
     gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(g), len(inputs)))])
     V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
@@ -321,7 +323,7 @@ def _assembled_descriptor(
     of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in massless_rotations(e)]
     M, W, K = (X[at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
     kinematic, turned = turning
-    return Descriptor(
+    out = Descriptor(
         mass=M,
         damping=W,
         stiffness=K,
@@ -338,6 +340,37 @@ def _assembled_descriptor(
         units=tuple(x.unit for x in names),
         rows=tuple(of[k] for k in rows),
         scale=c.sizes / c.values.length,
+    )
+    return _with_controllers(out, e, C[:, C.shape[1] - e.nz :], s_w) if e.nz else out
+
+
+def _with_controllers(d: Descriptor, e: EquationDerivatives, by_state: Any, by_input: np.ndarray) -> Descriptor:
+    """Add the controller states as velocities of further coordinates, their integrals; sampled ones are constant.
+
+    ``by_state`` and ``by_input`` are the derivatives of the outputs by the states, and of the laws by the inputs.
+    """
+    import scipy.sparse as sp
+
+    r, s, nv, n = e.at["r"], e.at["s"], e.state.c.structure.nv, e.nz
+    changes = sp.diags(-1.0 * ~e.sampled)
+    x, v, z = (changes @ sp.csr_matrix(X[s]) for X in (e.by_position, e.by_velocity, e.by_state))
+    none, of_rows, of_outputs = (sp.csr_matrix((k, n)) for k in (n, len(d.rows), d.C.shape[0]))
+    C = [d.C[:, :nv], of_outputs, d.C[:, nv : 2 * nv], by_state, d.C[:, 2 * nv : 3 * nv], of_outputs, d.C[:, 3 * nv :]]
+    states = [k.name for k in e.state.c.structure.controls]
+    return replace(
+        d,
+        mass=sp.block_diag([d.mass, sp.identity(n)]).tocsr(),
+        damping=sp.bmat([[d.damping, sp.csr_matrix(e.by_state[r])], [v, z]]).tocsr(),
+        stiffness=sp.bmat([[d.stiffness, None], [x, none]]).tocsr(),
+        constraints=sp.hstack([d.constraints, of_rows]).tocsr(),
+        by_position=sp.hstack([d.by_position, of_rows]).tocsr(),
+        kinematic=sp.block_diag([d.kinematic, none]).tocsr(),
+        turning=sp.block_diag([d.turning, none]).tocsr(),
+        forces=np.vstack([d.forces, changes @ by_input]),
+        C=sp.hstack(C).tocsr(),
+        coordinates=(*d.coordinates, *(f"integral of {name}" for name in states)),
+        units=(*d.units, *("" for _ in states)),
+        scale=np.r_[d.scale, np.ones(n)],
     )
 
 

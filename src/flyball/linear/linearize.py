@@ -17,6 +17,7 @@ from ..analysis_options import Options
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.force_balance import state_sizes
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.reduced_equations import (
@@ -36,17 +37,12 @@ from ..model.controller import Controller, Sensor
 from ..model.element_laws import Input, with_inputs
 from ..model.model import Model
 from ..model.quantities import ENERGY, single_quantity
+from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
 from ..results.linear_model import Descriptor, LinearModel, StateSpace
 from ..results.phases import CUMULATIVE_ENERGIES
 from ..results.result import Result
-from ..statics.controller_states import (
-    SampledSignal,
-    auxiliary_instant,
-    cycle_equations,
-    refuse_unsettled,
-    without_auxiliary_positions,
-)
+from ..simulation.diagnosis import refuse_contradicting_limits
 from ..statics.stability import stability_by_eigenvalues
 from .descriptor import (
     DENSE_FREEDOMS,
@@ -59,7 +55,10 @@ from .descriptor import (
     values_with_input_step,
 )
 from .operating_point import SizeTest, contact_operating_point, operating_state
+from .sampling_cycle import SampledSignal, cycle_equations, refuse_unsettled
 
+# For `refuse_switching_with_controllers`.
+SMALL_MOTIONS, JOINTS_INSTEAD = "small motions know", "put joints in its place"
 FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts as none
 # Dependence of an output on an input's rate below this part of its total dependence on the input is rounding.
 IMPROPER = 1e-12
@@ -124,7 +123,7 @@ def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
     if o.about is not None:
         x, named = _with_inputs(x, o.inputs)
     if not large:
-        return _reduced_linear_model(x, o, named)[0]
+        return _reduced_linear_model(x, o, named)
     whole = SparseEquations.at(x, o.frozen, _parameter_inputs(named))
     later = partial(_dense_state_space, model.snapshot(), o)
     return _linear_model(whole.e, named, o.outputs, later, sparse_descriptor(whole, named, o.outputs), None)
@@ -133,66 +132,70 @@ def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
 def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearModel, str]:
     """Linear equations of a mechanism with controllers, and their stability.
 
-    They follow from the auxiliary model. With sampled controllers they are difference equations over one cycle.
+    With sampled controllers they are difference equations over one cycle.
     """
-    d = auxiliary_instant(model, o.state(model), o.coordinates, o.outputs, frozen=o.frozen)
-    here, other = d.here, d.other
-    asked = replace(o, outputs=(*(other.outputs.get(name, name) for name in o.outputs), *other.laws.values()))
-    with d.errors_in_user_terms():
-        x, named = _with_inputs(d.state, o.inputs)
-        found, r = _reduced_linear_model(x, asked, named, d.off)
-        assert r.uncertainty is not None
-        space, own = without_auxiliary_positions(found.dense, r.uncertainty, other)
-    cycle = None
-    if other.laws:
-        samples = _sampled_signals(here, list(other.laws), len(o.outputs))
-        at = np.array([d.at[s.name] for s in samples])
-        sizes = np.array([other.scales[s.name].size for s in samples])
-        refuse_unsettled(samples, at, found.output_values[len(o.outputs) :], sizes, model.name)
-        space, own, cycle = cycle_equations(space, samples, len(o.outputs))
-    units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=False)]
-    linear = LinearModel(
-        model.name,
-        list(zip(found.inputs, found.input_units, strict=True)),
-        list(zip(o.outputs, units, strict=True)),
-        found.output_values[: len(o.outputs)],
-        snapshot(here),
-        replace(space, eigenvalues=_sorted(np.asarray(space.eigenvalues))),
-        lambda: found.descriptor,
-        found.turning,
-        found.seen_from,
-        cycle,
-    )
-    return linear, stability_by_eigenvalues(own, discrete=cycle is not None)
+    refuse_switching_with_controllers(model, SMALL_MOTIONS, JOINTS_INSTEAD)
+    given, o = o.outputs, replace(o, outputs=tuple(_signal_name(model, name) for name in o.outputs))
+    for name in o.outputs:
+        single_quantity(model, name)
+    x, named = _with_inputs(o.state(model), o.inputs)
+    e, f, frame, r = _checked_reduction(x, o, named)
+    space, found, period = _state_space(e, f, r, named, o.outputs), spectrum(r.A, r.uncertainty), None
+    which = np.flatnonzero(e.sampled)
+    if len(which):
+        samples = _sampled_signals(x, len(o.outputs))
+        refuse_unsettled(samples, x.z[which], e.block("s")[which], state_sizes(e).change[which], model.name)
+        y = np.vstack([_output_matrix(e, r, named, o.outputs), r.laws[which]])
+        names = [*o.outputs, *(s.name for s in samples)]
+        A, B, C, D = _matrices(r, y, named, names)
+        space = replace(space, A=A, B=B, C=C, D=D)
+        space, found, period = cycle_equations(space, samples, len(o.outputs))
+    space = replace(space, eigenvalues=_sorted(found.values))
+    descriptor = partial(dense_descriptor, e, f, frame, named, o.outputs)
+    linear = _linear_model(e, named, o.outputs, space, descriptor, frame, period)
+    linear.outputs = given
+    return linear, stability_by_eigenvalues(found, discrete=period is not None)
 
 
-def _sampled_signals(here: MechanismState, names: Sequence[str], first: int) -> list[SampledSignal]:
+def _signal_name(model: Model, name: str) -> str:
+    """Full name of an output: a controller's name stands for its only output."""
+    e = model.find(name)
+    return f"{name}.{e.bare}" if isinstance(e, Controller) and e.bare else name
+
+
+def _sampled_signals(x: MechanismState, first: int) -> list[SampledSignal]:
     """Sampled signals and states in the order of sampling; their laws are the outputs from ``first`` on."""
-    numbers, known = here.c.values.numbers, {x.name: x for x in here.c.structure.controls}
-    out = []
-    for k, name in enumerate(names):
-        n = numbers[known[name].controller.name]
-        out.append(SampledSignal(name, first + k, (float(n.period), float(n.offset)), known[name].signal))
+    out: list[SampledSignal] = []
+    for k in x.c.structure.controls:
+        if k.controller.sampled:
+            n = x.c.values.numbers[k.controller.name]
+            out.append(SampledSignal(k.name, first + len(out), (float(n.period), float(n.offset)), k.signal))
     return out
 
 
-def _reduced_linear_model(
-    x: MechanismState, o: LinearizeOptions, named: list[Input], speed_scales: np.ndarray | None = None
-) -> tuple[LinearModel, ReducedEquations]:
-    """Linear equations with the constraints eliminated; ``speed_scales`` is as in `steady_motion.refuse_unbalanced`."""
-    e, f, frame = _reduction_at(x, o.frozen, to=_parameter_inputs(named), speed_scales=speed_scales)
-    r = reduced_equations(e, f, frame, _input_terms(e, f, named), speed_scales)
+def _checked_reduction(
+    x: MechanismState, o: LinearizeOptions, named: list[Input]
+) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame, ReducedEquations]:
+    """Equations with the constraints eliminated; inputs and outputs that have no linear equations are refused."""
+    e, f, frame = _reduction_at(x, o.frozen, to=_parameter_inputs(named))
+    r = reduced_equations(e, f, frame, _input_terms(e, f, named))
     if frame.turning.any() and (named or o.outputs):
         _refuse_frame_dependence(e, f, r, frame, named, o.outputs)
     refuse_undetermined_outputs(x, o.outputs)
+    return e, f, frame, r
+
+
+def _reduced_linear_model(x: MechanismState, o: LinearizeOptions, named: list[Input]) -> LinearModel:
+    """Linear equations with the constraints eliminated."""
+    e, f, frame, r = _checked_reduction(x, o, named)
     space = _state_space(e, f, r, named, o.outputs)
-    return _linear_model(e, named, o.outputs, space, partial(dense_descriptor, e, f, frame, named, o.outputs), frame), r
+    return _linear_model(e, named, o.outputs, space, partial(dense_descriptor, e, f, frame, named, o.outputs), frame)
 
 
 def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpace:
     """Dense state space of a large mechanism, computed only when needed."""
     x, named = _with_inputs(o.state(model), o.inputs)
-    return _reduced_linear_model(x, o, named)[0].dense
+    return _reduced_linear_model(x, o, named).dense
 
 
 def _with_inputs(x: MechanismState, inputs: Sequence[str]) -> tuple[MechanismState, list[Input]]:
@@ -234,11 +237,11 @@ def _refuse_frame_dependence(
 
 
 def equations_without_inputs(
-    x: MechanismState, frozen: bool = False, like: FreeCoordinates | None = None, speed_scales: np.ndarray | None = None
+    x: MechanismState, frozen: bool = False, like: FreeCoordinates | None = None
 ) -> tuple[FreeCoordinates, TurningFrame, ReducedEquations]:
     """Reduced linear equations at a state, in the coordinates of ``like`` if given; errors as in `linearize`."""
-    e, f, frame = _reduction_at(x, frozen, like, speed_scales=speed_scales)
-    return f, frame, reduced_equations(e, f, frame, None, speed_scales)
+    e, f, frame = _reduction_at(x, frozen, like)
+    return f, frame, reduced_equations(e, f, frame)
 
 
 def _reduction_at(
@@ -246,15 +249,19 @@ def _reduction_at(
     frozen: bool,
     like: FreeCoordinates | None = None,
     to: Sequence[str] = (),
-    speed_scales: np.ndarray | None = None,
 ) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame]:
+    if x.c.structure.controls:
+        x.c.at(x.t, x.q, x.v)
+        refuse_contradicting_limits(x.c, x.t)
     e = EquationDerivatives(x)
     f = free_coordinates(e, like)
     refuse_singular_position(e, f)
-    both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
-    refuse_nonsmooth(e, *both, to)
+    states = np.zeros((len(x.v), e.nz))
+    dq, dv = np.hstack([f.Z, 0.0 * f.Zv, states]), np.hstack([0.0 * f.Z, f.Zv, states])
+    dz = np.eye(e.nz, dq.shape[1], dq.shape[1] - e.nz)
+    refuse_nonsmooth(e, dq, dv, dz, to=to)
     still = np.zeros((len(x.v),) * 2)
-    frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x)) if frozen else steady_frame(x, e, f, speed_scales)
+    frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x)) if frozen else steady_frame(x, e, f)
     frame.told = frame_description(x, frame, frozen)
     return e, f, frame
 
@@ -268,8 +275,8 @@ def _in_copy(model: Model, x: MechanismState) -> MechanismState:
 
 def _input_terms(e: EquationDerivatives, f: FreeCoordinates, inputs: list[Input]) -> InputTerms:
     """Derivatives of the equations by the inputs."""
-    r, g, n = input_effects(e, inputs)
-    return InputTerms(r, g[f.on_positions], n)
+    r, g, n, s = input_effects(e, inputs)
+    return InputTerms(r, g[f.on_positions], n, s)
 
 
 def _output_matrix(
@@ -277,7 +284,7 @@ def _output_matrix(
 ) -> np.ndarray:
     """Derivatives of the outputs by the states, the inputs and their rates, (outputs, n + 3 m)."""
     n = len(r.rate)
-    parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers)]
+    parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers, r.states)]
     out = curve_derivatives(e.state, names, parts)
     for k, i in enumerate(inputs):
         out[n + k] = curve_derivatives(
@@ -319,13 +326,14 @@ def _state_space(
     A, B, C, D = _matrices(r, _output_matrix(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
+    controls = [x.name for x in e.state.c.structure.controls]
     return StateSpace(
         A=A,
         B=B,
         C=C,
         D=D,
-        states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates)),
-        state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates)),
+        states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates), *controls),
+        state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates), *("" for _ in controls)),
         mass=r.M,
         damping=r.D,
         stiffness=r.K,
@@ -341,6 +349,7 @@ def _linear_model(
     dense: StateSpace | Callable[[], StateSpace],
     sparse: Descriptor | Callable[[], Descriptor],
     frame: TurningFrame | None,
+    period: float | None = None,
 ) -> LinearModel:
     shot = snapshot(e.state)
     curves = [shot.curve(name) for name in outputs]
@@ -354,6 +363,7 @@ def _linear_model(
         sparse,
         np.zeros(3) if frame is None else frame.turning,
         "" if frame is None else frame.told,
+        period,
     )
 
 

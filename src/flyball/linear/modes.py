@@ -14,17 +14,12 @@ from ..derivatives.output_derivatives import snapshot
 from ..derivatives.reduced_equations import TurningFrame
 from ..model.contact import has_switching_elements
 from ..model.model import Model
+from ..model.unsupported_elements import refuse_sampled_controllers, refuse_switching_with_controllers
 from ..numerics.rank import column_space
 from ..results.modes import Modes, is_growing
-from ..statics.controller_states import (
-    auxiliary_instant,
-    is_auxiliary,
-    refuse_sampled_controllers,
-    without_auxiliary_coordinates,
-)
 from ..tables.structure_definition import velocity_names
 from .descriptor import DENSE_FREEDOMS, DENSE_VELOCITIES, SparseEquations, exceeds_dense_size, uses_sparse_equations
-from .linearize import OperatingPointOptions, equations_without_inputs
+from .linearize import JOINTS_INSTEAD, SMALL_MOTIONS, OperatingPointOptions, equations_without_inputs
 from .operating_point import contact_operating_point
 
 DEFAULT_COUNT = 10
@@ -54,8 +49,9 @@ class ModesOptions(OperatingPointOptions):
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Compute the modes about an equilibrium or a steady motion: see `Mechanism.modes`."""
     if model.controllers:
-        return _controlled_modes(model, o)
-    if has_switching_elements(model):
+        refuse_sampled_controllers(model, "modes")
+        refuse_switching_with_controllers(model, SMALL_MOTIONS, JOINTS_INSTEAD)
+    elif has_switching_elements(model):
         joined, there, notes = contact_operating_point(model, o, "modes")
         return replace(_smooth_modes(joined, there), notes=notes)
     return _smooth_modes(model, o)
@@ -65,7 +61,7 @@ def _smooth_modes(model: Model, o: ModesOptions) -> Modes:
     """Modes of a mechanism without switching elements, except friction that slides."""
     count, frozen = o.count, o.frozen
     free = DENSE_VELOCITIES if count is None else max(DENSE_FREEDOMS, FREEDOMS_PER_MODE * count)
-    x = o.state(model, partial(exceeds_dense_size, free))
+    x = o.state(model, None if model.controllers else partial(exceeds_dense_size, free))
     if uses_sparse_equations(x, free):
         return _sparse_modes(x, count or DEFAULT_COUNT, frozen)
     f, frame, r = equations_without_inputs(x, frozen)
@@ -95,35 +91,16 @@ def _with_eigenvalue_data(
     return found
 
 
-def _controlled_modes(model: Model, o: ModesOptions) -> Modes:
-    """Modes of a mechanism with continuous controllers, from the auxiliary model; auxiliary bodies are left out."""
-    refuse_sampled_controllers(model, "modes")
-    d = auxiliary_instant(model, o.state(model), o.coordinates, (), frozen=o.frozen)
-    slides, x = d.other.slides, d.state
-    with d.errors_in_user_terms():
-        f, frame, r = equations_without_inputs(x, o.frozen, speed_scales=d.off)
-    r = without_auxiliary_coordinates(r, f, slides)
-    own = spectrum(r.A, r.uncertainty)
-    one, rest = _selected_eigenvalues(own, o.count)
-    mine = np.array([not is_auxiliary(n.name, slides) for n in velocity_names(x.c.structure)])
-    found = _normalised_modes(x, own, one, r.position @ own.vectors[:, one], mine)
-    found.point = snapshot(d.here)
-    return _with_eigenvalue_data(found, own, one, rest, frame)
+def _normalised_modes(x: MechanismState, eigenvalues: Spectrum, which: np.ndarray, shapes: np.ndarray) -> Modes:
+    """Modes scaled to a largest component of 1, seen from the ground."""
+    fastest = float(np.abs(eigenvalues.values).max(initial=0.0))
+    return _scaled_modes(x, eigenvalues.values[which], shapes, fastest)
 
 
-def _normalised_modes(
-    x: MechanismState, eigenvalues: Spectrum, which: np.ndarray, shapes: np.ndarray, selected: np.ndarray | None = None
-) -> Modes:
-    """Modes scaled to a largest component of 1, seen from the ground; only the velocities ``selected`` if given."""
-    w, fastest = eigenvalues.values[which], float(np.abs(eigenvalues.values).max(initial=0.0))
-    selected = np.ones(len(shapes), bool) if selected is None else selected
-    return _scaled_modes(x, w, shapes[selected], fastest, selected)
-
-
-def _scaled_modes(x: MechanismState, w: np.ndarray, shapes: np.ndarray, fastest: float, selected: np.ndarray) -> Modes:
-    """Scale modes with given eigenvalues ``w`` and shapes of the selected velocities."""
-    names = [n for n, own in zip(velocity_names(x.c.structure), selected, strict=True) if own]
-    length = (x.c.values.length / x.c.sizes)[selected, None]
+def _scaled_modes(x: MechanismState, w: np.ndarray, shapes: np.ndarray, fastest: float) -> Modes:
+    """Scale modes with given eigenvalues ``w`` and shapes."""
+    names = velocity_names(x.c.structure)
+    length = (x.c.values.length / x.c.sizes)[:, None]
     size = length * np.abs(shapes)
     for k in range(shapes.shape[1]):
         if size[:, k].max(initial=0.0) > 0.0:
@@ -160,9 +137,8 @@ def _sparse_modes(x: MechanismState, count: int, frozen: bool) -> Modes:
         values += [w[own].mean()] * own_shapes.shape[1]
         often += [(len(own), own_shapes.shape[1])] * own_shapes.shape[1]
         shapes.append(own_shapes)
-    every = np.ones(len(whole.scale), bool)
     shape = whole.scale[:, None] * np.hstack(shapes)[:, :count]
-    found = _scaled_modes(x, np.array(values[:count], complex), shape, p.fastest, every)
+    found = _scaled_modes(x, np.array(values[:count], complex), shape, p.fastest)
     found.residual = residual
     found.multiplicity, found.geometric_multiplicity = np.array(often[:count], int).reshape(-1, 2).T
     return found

@@ -29,11 +29,10 @@ from ..derivatives.eigenvalues import spectrum
 from ..derivatives.reduced_equations import FreeCoordinates, ReducedEquations, TurningFrame
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
-from ..model.unsupported_elements import refuse_unsupported
+from ..model.unsupported_elements import refuse_sampled_controllers, refuse_unsupported
 from ..progress import ReportProgress, progress_bar
 from ..results.equilibrium import Equilibrium
 from ..results.modes import Crossing, RootLocus, half_plane
-from ..statics.controller_states import auxiliary_instant, refuse_sampled_controllers, without_auxiliary_coordinates
 from ..statics.equilibrium import equilibrium, rest_options
 from ..statics.equilibrium_series import EquilibriaOptions, checked_values, equilibria, series_error
 from .linearize import OperatingPointOptions, equations_without_inputs
@@ -51,8 +50,8 @@ class EigenvalueSample:
         Value of the parameter.
     w, raw : ndarray (n,) complex
         Eigenvalues with rounding removed, and as computed.
-    shapes : ndarray (2 nv, n) complex
-        Unit vectors of position and velocity changes in natural units.
+    shapes : ndarray (2 nv + nz, n) complex
+        Unit vectors of changes of positions, velocities and controller states, in natural units.
     told : str
         Description of the frame that they refer to.
     """
@@ -100,7 +99,8 @@ def eigenvalue_sample(
     own = spectrum(r.A, r.uncertainty)
     n = len(r.A)
     fast = float(np.abs(own.values).max(initial=0.0)) or 1.0
-    shapes = np.vstack([r.position[:, :n] / f.scale[:, None], r.velocity[:, :n] / f.scale[:, None] / fast])
+    parts = [r.position[:, :n] / f.scale[:, None], r.velocity[:, :n] / f.scale[:, None] / fast]
+    shapes = np.vstack([*parts, r.states[:, :n] / r.changes[:, None]])
     shapes = shapes @ own.vectors
     shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
     return EigenvalueSample(place, value, own.values, own.raw, shapes, frame.told)
@@ -473,12 +473,7 @@ def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
         value = float(np.interp(place, np.arange(len(points)), points))
         about = rest.at(place, value) if o.equilibrium else None
         here = o.here(value, about)
-        if not model.controllers:
-            return eigenvalue_sample(place, value, *equations_without_inputs(here.state(model), o.frozen))
-        d = auxiliary_instant(model, here.state(model), o.coordinates, (), frozen=o.frozen)
-        with d.errors_in_user_terms():
-            f, frame, r = equations_without_inputs(d.state, o.frozen, speed_scales=d.off)
-        return eigenvalue_sample(place, value, f, frame, without_auxiliary_coordinates(r, f, d.other.slides))
+        return eigenvalue_sample(place, value, *equations_without_inputs(here.state(model), o.frozen))
 
     done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
     with progress_bar(o.progress, f"eigenvalues over {o.parameter}") as tell:

@@ -402,8 +402,12 @@ def has_contact(model: Model) -> bool:
 
 def has_switching_elements(model: Model) -> bool:
     """Return whether any element switches: these, or friction, locks, latches, inextensible ropes; or events."""
-    held = any(not w.kind.elastic for e in model.elements() for w in e.switches())
-    return has_contact(model) or held or any(e.category == "events" for e in model.elements())
+    return holds_or_touches(model) or any(e.category == "events" for e in model.elements())
+
+
+def holds_or_touches(model: Model) -> bool:
+    """Return whether any element switches, besides events."""
+    return has_contact(model) or any(not w.kind.elastic for e in model.elements() for w in e.switches())
 
 
 def not_for_impulse_stepping(model: Model) -> list[Element]:

@@ -11,7 +11,7 @@ import difflib
 import inspect
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
@@ -425,36 +425,3 @@ def apply_function(function: Callable[..., Any], *args: Any) -> Any:
 
 def _refuse(name: str, problem: str, remedy: str) -> NoReturn:
     raise ExpressionError(f"the function '{name}' {problem}; {remedy}")
-
-
-_BETWEEN = ("+", "-", "*", "/", "**", "<", "<=", "and", "or")
-
-
-def expression_text(node: SyntaxNode, names: Mapping[str, str]) -> str:
-    """Return the text of a formula, with names replaced according to ``names``.
-
-    Raises
-    ------
-    ModelError
-        If a Python function is called in it.
-    """
-    if node.kind == "number":
-        return f"({float(node.value)!r})"
-    if node.kind == "name":
-        return names.get(node.value, node.value)
-    args = [expression_text(arg, names) for arg in node.args]
-    if node.kind == "neg":
-        return f"(-{args[0]})"
-    if node.kind == "not":
-        return f"(not {args[0]})"
-    if node.kind in _BETWEEN:
-        return f"({f' {node.kind} '.join(args)})"
-    if node.kind == "table":
-        return f"{node.value}({args[0]})"
-    if node.kind in ("function", "called"):
-        where, what = (f"{node.value.where}: ", node.value.function) if node.kind == "called" else ("", node.value)
-        raise ModelError(
-            f"{where}the Python function '{function_name(what)}' has no derivatives that are known; write it as an "
-            f"expression or a Table"
-        )
-    return f"{node.kind}({', '.join(args)})"

@@ -55,7 +55,6 @@ class Model:
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
     kept: ResultCache  # of a snapshot: cached results
-    aside: frozenset[str] = frozenset()  # parts of a copy that replace others; left out of energies and works
 
     def __init__(
         self,

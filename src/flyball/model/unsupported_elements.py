@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
+from .contact import holds_or_touches
 from .element import Element
 from .model import Model
 
@@ -85,6 +86,37 @@ def refuse_controllers(model: Model, analysis: str) -> None:
         raise ModelError(
             f"{model.name!r} has {titles}, and {analysis} does not support controllers; simulate and linearize do. "
             "Use a copy of the mechanism whose laws have formulas in their place"
+        )
+
+
+def refuse_switching_with_controllers(model: Model, analysis: str, instead: str) -> None:
+    """Refuse controllers beside contacts, stops, friction and the like.
+
+    Raises
+    ------
+    ModelError
+        If the mechanism has both; ``instead`` is what can be done besides leaving out what switches.
+    """
+    if model.controllers and holds_or_touches(model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and {analysis} only one of the two; leave "
+            f"what holds out, m.changed({{...: None}}), or {instead}"
+        )
+
+
+def refuse_sampled_controllers(model: Model, analysis: str) -> None:
+    """Refuse sampled controllers, whose signals are constant between sampling instants.
+
+    Raises
+    ------
+    ModelError
+        With their names.
+    """
+    held = [e.title for e in model.controllers if e.sampled]
+    if held:
+        raise ModelError(
+            f"{model.name!r} has {', '.join(held)}, sampled, and {analysis} is about continuous time; linearize gives "
+            f"the equations from one instant to the next, and their eigenvalues"
         )
 
 

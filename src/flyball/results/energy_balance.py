@@ -69,12 +69,10 @@ class Energy(NamedQuantities):
         """All its quantities by name."""
         return quantities(self._result.model, ENERGY)
 
-    @cached_property
-    def _bodies(self) -> list[int]:
-        """Rows of the body table, without replacement bodies."""
-        s = self._result.values.structure
-        aside = {s.place[name] for name in s.model.aside if name in s.place}
-        return [b for b in range(len(self._result.values.system.tree.parent)) if b not in aside]
+    @property
+    def _bodies(self) -> np.ndarray:
+        """All rows of the body table."""
+        return np.arange(len(self._result.values.system.tree.parent))
 
     @cached_property
     def kinetic(self) -> np.ndarray:

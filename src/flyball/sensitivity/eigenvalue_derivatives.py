@@ -25,7 +25,7 @@ from .parameter_derivatives import DerivativeRequest, ParameterFunction, differe
 
 def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
     """Eigenvalues and their derivatives; with sampled controllers the multipliers of one cycle."""
-    matrix, unit = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
+    matrix, unit = _system_matrix(a)
     base = matrix(a.parameters)
     dA = np.array([difference_derivative(a.model, a.parameters, name, matrix) for name in a.to])
     w, dw = eigenvalue_derivatives(
@@ -37,7 +37,7 @@ def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
 
 def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:
     """Function that returns the eigenvalues for any parameters, in the order of the initial ones."""
-    matrix, _ = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
+    matrix, _ = _system_matrix(a)
     A = matrix(a.parameters)
     first, _ = eigenvalue_derivatives(A, np.zeros((0, *A.shape)))
 
@@ -47,8 +47,10 @@ def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:
     return found
 
 
-def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
-    """Function for the system matrix without controllers, in fixed free coordinates; and the unit of eigenvalues."""
+def _system_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
+    """Function for the system matrix, in fixed free coordinates; and the unit of eigenvalues."""
+    if any(e.sampled for e in a.model.controllers):
+        return _cycle_matrix(a), ""
     about = _equilibrium_by_parameters(a)
 
     def state(parameters: Mapping[str, float]) -> MechanismState:
@@ -56,12 +58,12 @@ def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
 
     begin = state(a.parameters)
     f, _, _ = equations_without_inputs(begin)
-    refuse_nonsmooth(EquationDerivatives(begin), np.zeros((len(begin.v), 1)), np.zeros((len(begin.v), 1)), a.to)
+    refuse_nonsmooth(EquationDerivatives(begin), *np.zeros((2, len(begin.v), 1)), to=a.to)
     return lambda parameters: equations_without_inputs(state(parameters), like=f)[2].A, "1/s"
 
 
-def _closed_loop_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
-    """Function for the closed-loop matrix, and the unit of eigenvalues: empty for sampled controllers."""
+def _cycle_matrix(a: DerivativeRequest) -> ParameterFunction:
+    """Function for the matrix over one cycle of sampled controllers."""
     about = _equilibrium_by_parameters(a)
 
     def linear(parameters: Mapping[str, float]) -> Any:
@@ -77,7 +79,7 @@ def _closed_loop_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
             raise ModelError(f"the states there are {', '.join(now.states)}, and were {', '.join(first.states)}")
         return now.A
 
-    return found, "" if first.period else "1/s"
+    return found
 
 
 def _equilibrium_by_parameters(a: DerivativeRequest) -> Callable[[Mapping[str, float]], Any]:

@@ -17,7 +17,7 @@ is differenced.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -45,13 +45,13 @@ from ..derivatives.equation_derivatives import (
 from ..derivatives.equation_derivatives import COMPLEX_STEP as COMPLEX
 from ..engine.entry_point import allocate_work
 from ..engine.kinematics import BodyKinematicsOverTime, joint_velocities, retract
-from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..numerics.rank import RANK_TOLERANCE
 from ..results.recorded_kinematics import RecordedMotion
 from ..simulation.initial_state import InitialState
 from ..simulation.prescribed_motion import leaves_no_freedom
+from ..tables.law_inputs import initial_controller_states
 from ..tables.reference_configuration import BodyState, positions
 from ..tables.structure_definition import velocity_names
 from ..tables.table_definitions import named_arrays
@@ -178,17 +178,21 @@ GAP_ROUNDING = 1e-9
 
 @dataclass
 class StateDerivative:
-    """Changes per unit of a parameter: of positions along the velocities, of velocities, accelerations, multipliers."""
+    """Changes per unit of a parameter.
+
+    Of positions along the velocities, of velocities, accelerations, multipliers and controller states.
+    """
 
     q: np.ndarray
     v: np.ndarray
     vdot: np.ndarray
     lam: np.ndarray
+    z: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
-    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def parts(self) -> tuple[np.ndarray, ...]:
         """The changes as rows, for `output_derivatives.curve_derivatives`."""
-        return self.q[None], self.v[None], self.vdot[None], self.lam[None]
+        return self.q[None], self.v[None], self.vdot[None], self.lam[None], self.z[None]
 
 
 class ParameterDirection:
@@ -208,13 +212,8 @@ class ParameterDirection:
 
     def along(self, x: MechanismState, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """Derivatives (width,) of all residuals at x along changes of positions, velocities and the parameter."""
-        nv = len(x.v)
-        steps = np.zeros((1, 3 * nv + 1), complex)
-        steps[0, :nv], steps[0, nv : 2 * nv] = 1j * COMPLEX_STEP * dq, 1j * COMPLEX_STEP * dv
-        out = np.zeros((1, self.e.width), complex)
-        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
-        evaluate_residuals(self.system, self.work, complex(x.t), y, vdot, lam, steps, out)
-        return complex_step_derivative(out[0])
+        steps = 1j * COMPLEX_STEP * np.r_[dq, dv, np.zeros(len(dq) + 1 + self.e.nz)][None]
+        return complex_step_derivative(self.e.residuals(x, steps, self.system, self.work)[0])
 
 
 class ConstrainedSystem:
@@ -371,6 +370,12 @@ def initial_changes(
         consistent_changes(d, x, lin, *np.split(difference_derivative(model, parameters, d.name, found), 2))
         for d in directions
     ]
+
+
+def initial_state_changes(d: ParameterDirection) -> np.ndarray:
+    """Derivatives of the initial controller states by the parameter, (nc,)."""
+    initial = initial_controller_states(d.values.structure, d.values.numbers)
+    return d.derivative(np.array(initial, complex))
 
 
 def is_fully_driven(base: Assembly) -> bool:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..analysis_options import Options, require_positive
 from ..assembly.assemble import assemble
-from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..assembly.compiled_mechanism import CompiledMechanism
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, values_with_complex_step
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import (
@@ -21,12 +21,10 @@ from ..derivatives.output_derivatives import (
     snapshot,
 )
 from ..errors import ModelError, SingularityError
-from ..model.controller_signals import controller_states
 from ..model.element_laws import refuse_jumping_laws, refuse_jumping_rates
-from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..model.quantities import single_quantity
-from ..model.unsupported_elements import refuse_controllers, refuse_unsupported
+from ..model.unsupported_elements import refuse_controllers, refuse_sampled_controllers, refuse_unsupported
 from ..results.result import Result
 from ..results.sensitivity_and_optimum import Sensitivity
 from ..simulation.initial_state import find_initial_state, refuse_unknown_coordinates
@@ -34,15 +32,7 @@ from ..simulation.integration_options import default_integration, output_times
 from ..simulation.law_faults import refuse_out_of_table
 from ..simulation.method_choice import SimulateOptions
 from ..simulation.simulate import clock_for, simulate
-from ..statics.controller_states import (
-    AuxiliaryModel,
-    StateScale,
-    auxiliary_model,
-    errors_in_user_terms,
-    initial_state_formulas,
-    refuse_sampled_controllers,
-)
-from ..statics.equilibrium import determined_auxiliary_rest, equilibrium, rest_options
+from ..statics.equilibrium import determined_rest, equilibrium, rest_options
 from ..statics.stability import RestState
 from .eigenvalue_derivatives import eigenvalue_function, eigenvalue_sensitivity
 from .parameter_derivatives import (
@@ -53,6 +43,7 @@ from .parameter_derivatives import (
     StateDerivative,
     changes_in_motion_coordinates,
     initial_changes,
+    initial_state_changes,
     initial_state_derivatives,
     is_fully_driven,
     parameter_scale,
@@ -165,7 +156,7 @@ def _checked_question(model: Model, o: SensitivityOptions) -> DerivativeRequest:
 
 
 def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
-    """Sensitivity of a mechanism with controllers, by its auxiliary model."""
+    """Sensitivity of a mechanism with controllers."""
     if o.analysis not in ("motion", "equilibrium", "modes") or model.events:
         refuse_controllers(
             model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
@@ -175,17 +166,7 @@ def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
     refuse_sampled_controllers(model, "sensitivity")
     a = _checked_question(model, o)
     refuse_jumping_rates(model, a.to)
-    other = moving_copy(model, o.parameters, o.of)
-    named = tuple(other.outputs.get(name, name) for name in o.of)
-    with errors_in_user_terms(other):
-        found = _with_model_names(_computed_sensitivity(other.model, replace(o, of=named, verify=False)), o.of, other)
-    return _with_verification(a, o.analysis, found) if o.verify else found
-
-
-def _with_model_names(found: Sensitivity, of: tuple[str, ...], other: AuxiliaryModel) -> Sensitivity:
-    """Translate the results of an auxiliary model to the names of the model."""
-    units = ("" if name in other.outputs else u for name, u in zip(of, found.units, strict=True))
-    return replace(found, of=of, units=tuple(units))
+    return _computed_sensitivity(model, o)
 
 
 def _with_verification(a: DerivativeRequest, analysis: str, out: Sensitivity) -> Sensitivity:
@@ -242,7 +223,8 @@ def _refuse_kinks(a: DerivativeRequest, e: EquationDerivatives, tangents: Sequen
     """Refuse forces without a derivative along the changes by the parameters, or by a parameter."""
     none = np.zeros((len(e.state.v), 1))
     dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
-    refuse_nonsmooth(e, dq, dv, a.to)
+    dz = np.column_stack([np.zeros((e.nz, 1)), *(k.z for k in tangents)])
+    refuse_nonsmooth(e, dq, dv, dz, to=a.to)
 
 
 def _instant_function(a: DerivativeRequest) -> ParameterFunction:
@@ -268,7 +250,10 @@ def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
         refuse_jumping_laws(a.model, a.to)
         _refuse_kinks(a, e, ())
     pairs = initial_changes(a.model, a.parameters, base, x, directions, lin)
-    start = [changes_in_motion_coordinates(begun, *of) for of in zip(directions, values, pairs, strict=True)]
+    start = [
+        (*changes_in_motion_coordinates(begun, *of), initial_state_changes(of[0]))
+        for of in zip(directions, values, pairs, strict=True)
+    ]
     clock = clock_for(begun, a.t, float(a.times[-1]), a.times, default_integration(a.coordinates, a.rtol, a.atol))
     loop = VariationalIntegration(begun, clock, values, [parameter_scale(a.model, a.parameters, name) for name in a.to])
     varied = (
@@ -326,10 +311,7 @@ def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
     found = equilibrium(a.model, rest_options(a.t, a.parameters))
     b = found.assembly
     if a.model.controllers:  # controller states are unknowns, too
-        other, rest = determined_auxiliary_rest(a.model, b, a.of)
-        named = tuple(other.outputs.get(name, name) for name in a.of)
-        with errors_in_user_terms(other):
-            return _with_model_names(_sensitivity_at_rest(replace(a, model=other.model, of=named), rest), a.of, other)
+        return _sensitivity_at_rest(a, determined_rest(b))
     if abs(found.least) < LEAST_STIFFNESS_RATIO:
         weak = ", ".join(found.weakest)
         raise SingularityError(
@@ -348,8 +330,9 @@ def _sensitivity_at_rest(a: DerivativeRequest, rest: RestState) -> Sensitivity:
     still = np.zeros(len(x.v))
     for d in directions:
         left = d.along(x, still, still)
-        q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
-        tangents.append(StateDerivative(q, still, still, lam))
+        change, lam = rest.solved(np.r_[left[d.e.at["r"]], -left[d.e.at["s"]]], left[d.e.at["g"]])
+        q, z = np.split(change, [len(still)])
+        tangents.append(StateDerivative(q, still, still, lam, z))
     _refuse_kinks(a, rest.equations, tangents)
     column = _derivative_columns(a, x, directions, tangents)
     return Sensitivity(
@@ -385,32 +368,3 @@ ANALYSES: dict[
     "equilibrium": (_equilibrium_sensitivity, _equilibrium_function),
     "modes": (eigenvalue_sensitivity, eigenvalue_function),
 }
-
-
-# Motion of a mechanism with controllers, by an auxiliary model with bodies in their place (`controller_states`).
-
-
-STATE_MASS_RATIO = (
-    1e-3  # mass of an auxiliary body relative to the mechanism: it enters the error estimate of the works
-)
-
-
-def moving_copy(model: Model, parameters: Mapping[str, float] | None, outputs: Sequence[str]) -> AuxiliaryModel:
-    """Auxiliary model in which velocities represent controller states, with the initial state of the model.
-
-    Parameters
-    ----------
-    model : Model
-        The model with continuous controllers.
-    parameters : mapping
-        Values that replace the model's.
-    outputs : sequence of str
-        Requested curves.
-    """
-    c = compile_mechanism(model, parameters=parameters)
-    mass = STATE_MASS_RATIO * float(c.values.system.bodies.mass.sum()) or 1.0
-    scales = {x.name: StateScale(push=mass, mass=mass) for x in controller_states(model)}
-    begin, env = initial_state_formulas(model), model.environment(parameters)
-    other = auxiliary_model(model, begin, outputs, scales=scales, board=mass)
-    now = {name: number(text, env, None, f"what {name!r} begins with") for name, text in begin.items()}
-    return replace(other, at=now)

@@ -143,6 +143,7 @@ class VariationalIntegration:
         c = start.assembly.compiled
         self.c, s, S = c, c.structure, c.values.system
         self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.rows.law), len(values)
+        self.controls = len(s.controls)
         self.prescribed = [int(S.tree.v[b]) for b in s.prescribed.values()]
         self.R: Tableau = tableau(method)
         self.motion_width = 1 + len(start.y) + self.nv + self.nr + len(self.prescribed)
@@ -153,8 +154,8 @@ class VariationalIntegration:
         )  # fmt: skip
         self.output = OutputBuffer(np.zeros((4, max(self.motion_width, 1))))
         self.system, self.scratch, tables = _combined_tables(s, complex_system(S), values)
-        found = np.zeros((1, self.nv + 3 * self.nr + 3 * len(s.measured)), complex)
-        steps = np.zeros((1, 3 * self.nv + 1), complex)
+        found = np.zeros((1, self.nv + 3 * self.nr + 3 * len(s.measured) + self.controls), complex)
+        steps = np.zeros((1, 3 * self.nv + 1 + self.controls), complex)
         t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
         self.bench = residual.ResidualBatch(t, y, vdot, lam, steps, found)
         self.plan = self._step_plan(values, tables)
@@ -174,10 +175,10 @@ class VariationalIntegration:
         nv, nz, rows = self.nv, self.nz, friction_load_rows(s).astype(np.int64)
         m, wide = len(rows), nv + self.nr + nv
         return SensitivityPlan(
-            np.array([self.nq, nz, self.n, 0], np.int64), np.array(first, np.int64),
+            np.array([self.nq, nz, self.n, 0, self.controls], np.int64), np.array(first, np.int64),
             np.concatenate(entry).astype(np.int64), np.concatenate(step), tables.view(float), np.zeros((self.n, wide)),
-            np.zeros(nv), np.zeros(self._state_width), np.zeros(nv), rows, np.zeros((m, wide)), np.zeros((m, nz)),
-            np.zeros((m, m + 1)),
+            np.zeros(nv), np.zeros(self._state_width), np.zeros(nz), np.zeros(nv), np.zeros(self.controls), rows,
+            np.zeros((m, wide)), np.zeros((m, nz)), np.zeros((m, m + 1)),
         )  # fmt: skip
 
     @property
@@ -185,15 +186,23 @@ class VariationalIntegration:
         """Number of state variables of motion and derivatives."""
         return self.nq + self.nv + self.nz + self.n * (2 * self.nv + self.nz)
 
-    def run(self, dq: np.ndarray, dv: np.ndarray) -> MotionSensitivity:
-        """Integrate from derivatives (parameters, nv) of the initial positions and velocities.
+    def _places(self, k: int) -> np.ndarray:
+        """Places of the states of the motion (k = 0), or of their changes with parameter k - 1: see `state_place`."""
+        at, n, i = self.nq + self.nv + 2 * self.nv * self.n, self.controls, np.arange(self.nz)
+        return np.where(i < n, at + k * n + i, at + (self.n + 1) * n + k * (self.nz - n) + i - n)
+
+    def run(self, dq: np.ndarray, dv: np.ndarray, dc: np.ndarray) -> MotionSensitivity:
+        """Integrate from derivatives of the initial positions and velocities (parameters, nv), and controller states.
 
         Raises
         ------
         SimulationError
             If it stops: at a singular position, or where a law is not smooth.
         """
-        clock = self._clock(np.concatenate([dq, dv], axis=1) * self.sizes[:, None])
+        size = self.sizes[:, None]
+        clock = self._clock(np.concatenate([dq, dv], axis=1) * size)
+        for k, change in enumerate(dc * size):
+            clock.y[0, self._places(k + 1)[: self.controls]] = change
         buffer = np.zeros((max(2, min(len(clock.times), OUTPUT_NUMBERS // self.width + 1)), self.width))
         none = np.zeros((0, self._state_width))
         rows = []
@@ -209,8 +218,7 @@ class VariationalIntegration:
         n = len(t)
         states = np.zeros((n, self._state_width))
         states[:, : self.nq + self.nv] = y[:, : self.nq + self.nv]
-        z = self.nq + self.nv + 2 * self.nv * self.n
-        states[:, z : z + self.nz] = y[:, self.nq + self.nv :]
+        states[:, self._places(0)] = y[:, self.nq + self.nv :]
         self.plan.size[POWERS] = 1
         clock = self._clock(np.zeros((self.n, 2 * self.nv)))._replace(times=np.ascontiguousarray(t))
         out = np.zeros((n, self.width))
@@ -241,10 +249,10 @@ class VariationalIntegration:
         Y = np.zeros((ex.STATE_ROWS, self._state_width))
         at, more = self.nq + self.nv, 2 * self.nv * n
         y = self.start.y
-        Y[0, :at], Y[0, at : at + more], Y[0, at + more : at + more + self.nz] = y[:at], changes.ravel(), y[at:]
-        accounts = [own.integrals + more + k * self.nz for k in range(n + 1)]
+        Y[0, :at], Y[0, at : at + more], Y[0, self._places(0)] = y[:at], changes.ravel(), y[at:]
+        accounts = [self._places(k)[own.integrals - at] for k in range(n + 1)]
         count = own.count.copy()
-        count.controlled = at + more
+        count.controlled = at + more + (n + 1) * self.controls
         return own._replace(
             real=own.real.copy(), count=count, y=Y, K=np.zeros((len(own.K), self._state_width)),
             integrals=np.concatenate(accounts).astype(np.int64),
@@ -268,8 +276,8 @@ class VariationalIntegration:
         real, own = clock.real.copy(), self.clock
         real.t = t
         y, at = own.y.copy(), self.nq + self.nv
-        changes = 0 if motion_only else 2 * self.nv * self.n
-        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + changes :][: self.nz]
+        places = at + np.arange(self.nz) if motion_only else self._places(0)
+        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, places]
         stopped = own._replace(real=real, count=clock.count, y=y)
         message, cause = failure_reason(self.start.assembly, self.start.base, stopped, with_result=False)
         error = SimulationError(

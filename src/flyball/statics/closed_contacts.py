@@ -28,7 +28,7 @@ from ..collision.tables import (
     Geometry,
 )
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.reduced_equations import force_magnitudes
+from ..derivatives.force_balance import force_magnitudes
 from ..errors import ModelError
 from ..math.vec import axes_across
 from ..model.body import GROUND

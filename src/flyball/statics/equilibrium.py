@@ -1,13 +1,13 @@
 """Static equilibrium from a guess, with controllers, preloads or steady rotation, and its stability.
 
-With controllers, their states must be constant, too; the auxiliary model of `controller_states` is searched. A
+With controllers, their states are further unknowns, and their rates must be zero, too. A
 preload is the force offset that makes the reference configuration an equilibrium.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,29 +17,21 @@ from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.force_balance import StateSizes, state_sizes
 from ..derivatives.output_derivatives import snapshot
 from ..derivatives.reduced_equations import free_coordinates
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
 from ..model.contact import has_switching_elements
 from ..model.element_laws import with_inputs
 from ..model.model import Model
+from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, STABLE, UNSTABLE, Equilibrium
 from ..results.result import Result
+from ..simulation.diagnosis import refuse_contradicting_limits
 from ..simulation.initial_state import find_initial_state as begin_motion
 from ..tables.structure_definition import velocity_names
 from .contact_equilibrium import contact_equilibrium
-from .controller_states import (
-    AuxiliaryModel,
-    StateScale,
-    auxiliary_model,
-    auxiliary_state,
-    controlled_search_failure,
-    errors_in_user_terms,
-    in_user_terms,
-    state_scales,
-    states_by_positions,
-)
 from .equilibrium_search import (
     LONGEST_STEP,
     equilibrium_result,
@@ -59,31 +51,10 @@ NEWTON_METHOD, FOLLOWING_METHOD = "Newton's method", "following the forces and t
 SIMILAR_SCALES = 30.0  # largest factor between the scales of two searches that counts as similar
 
 
-def auxiliary_rest(
-    model: Model, at: dict[str, float], x: MechanismState, scales: dict[str, StateScale], outputs: Sequence[str] = ()
-) -> tuple[AuxiliaryModel, RestState]:
-    """Auxiliary model in which positions represent controller states, with its state at rest.
-
-    Raises
-    ------
-    ModelError
-        If the model has switching elements, too.
-    """
-    other = auxiliary_model(model, {name: repr(z) for name, z in at.items()}, outputs, places=True, scales=scales)
-    if has_switching_elements(other.model):
-        raise ModelError(
-            f"{model.name!r} has controllers and parts with modes (stops, friction, contacts), and equilibrium "
-            "supports only one of the two; leave these parts out, m.changed({...: None}), or simulate until it "
-            "rests"
-        )
-    b = auxiliary_state(other, x, "absolute")
-    return other, RestState.at(b.c, b.t, b.q)
-
-
 def controlled_rest(
-    model: Model, c: CompiledMechanism, t: float, q: np.ndarray, at: dict[str, float]
+    model: Model, c: CompiledMechanism, t: float, q: np.ndarray, z: np.ndarray
 ) -> tuple[np.ndarray, str]:
-    """Positions at rest near given ones, and the method that found them; the states are stored in ``c``.
+    """Positions at rest near given ones, and the method that found them; the controller states are stored in ``c``.
 
     A controller whose output is at a limit has no gradient for Newton's method. The search is then first made without
     limits. If that fails, a pseudo-transient search follows the forces and the controllers.
@@ -94,31 +65,30 @@ def controlled_rest(
     c : CompiledMechanism
         The compiled model, in absolute coordinates.
     t, q : float, ndarray
-    at : dict
-        State -> its initial value.
+    z : ndarray (nz,)
+        Initial controller states.
 
     Raises
     ------
     NotConverged
         With the residuals.
     """
-    begin = _SearchPoint(c, t, q, at)
+    begin = RestState(c, t, q, np.zeros(len(c.structure.rows)), z)
     try:
-        return _searched_rest(model, begin, newton_search_to).q, NEWTON_METHOD
+        return _searched_rest(begin, newton_search_to).q, NEWTON_METHOD
     except AnalysisError as error:
         why = error
     wide = without_limits(model)
     if wide is not None:
         try:
-            return _searched_rest(
-                model, _searched_rest(wide, begin, newton_search_to), newton_search_to
-            ).q, f"{NEWTON_METHOD}, at first without limits"
+            free = compile_mechanism(wide.snapshot(), parameters=c.parameters)
+            start = replace(begin, c=free, q=free.take(c, t, q, np.zeros(c.structure.nv))[0])
+            found = _searched_rest(start, newton_search_to)
+            return _searched_rest(replace(found, c=c), newton_search_to).q, f"{NEWTON_METHOD}, at first without limits"
         except AnalysisError:
             pass
     try:
-        return _searched_rest(
-            model, _searched_rest(model, begin, pseudo_transient_search), newton_search_to
-        ).q, FOLLOWING_METHOD
+        return _searched_rest(_searched_rest(begin, pseudo_transient_search), newton_search_to).q, FOLLOWING_METHOD
     except AnalysisError:
         raise why from None
 
@@ -135,51 +105,40 @@ def without_limits(model: Model) -> Model | None:
     return other
 
 
-@dataclass(frozen=True)
-class _SearchPoint:
-    """Start or end of a search: positions and controller states."""
+def _with_sizes(x: RestState) -> RestState:
+    """The same state with the sizes of its controller states there.
 
-    c: CompiledMechanism
-    t: float
-    q: np.ndarray
-    at: dict[str, float]
-
-    def state(self) -> MechanismState:
-        """State of the model at rest, with these controller states."""
-        self.c.z[: len(self.at)] = [*self.at.values()]
-        return MechanismState.resting(self.c, self.t, self.q)
-
-    def moved(self, other: AuxiliaryModel, x: RestState) -> _SearchPoint:
-        """The search point of the model that corresponds to a state of the auxiliary model."""
-        q, _ = self.c.take(x.c, x.t, x.q, np.zeros(x.c.structure.nv))
-        return _SearchPoint(self.c, self.t, q, dict(zip(self.at, states_by_positions(other, self.at, x), strict=True)))
+    Raises
+    ------
+    AnalysisError
+        If the lower limit of a controller exceeds the upper one.
+    """
+    e = replace(x, lam=0.0 * x.lam).equations
+    refuse_contradicting_limits(x.c, x.t)
+    moving = EquationDerivatives(MechanismState.moving(x.c, x.t, x.q, e.state.v))
+    return replace(x, sizes=state_sizes(moving)).balanced()
 
 
-def _searched_rest(
-    model: Model, place: _SearchPoint, search: Callable[[RestState], tuple[RestState | None, RestState]]
-) -> _SearchPoint:
-    """End of a search, repeated until the scales are those of the end point."""
-    scales = None
-    for _ in range(SCALING_PASSES):
-        x = place.state()
-        before, scales = scales, state_scales(model, place.at, x, places=True)
-        if before is not None and _are_similar(before, scales):
+def _searched_rest(x: RestState, search: Callable[[RestState], tuple[RestState | None, RestState]]) -> RestState:
+    """End of a search, repeated until the sizes of the controller states are those of the end point."""
+    for k in range(SCALING_PASSES):
+        sized = _with_sizes(x)
+        if k and _are_similar(x.sizes, sized.sizes):
             break
-        other, begin = auxiliary_rest(model, place.at, x, scales)
-        with errors_in_user_terms(other):
-            found, last = search(begin)
+        found, last = search(sized)
         if found is None:
-            raise _with_saturation_note(controlled_search_failure(last, other), model, place.moved(other, last))
-        place = place.moved(other, found)
-    return place
+            raise _with_saturation_note(search_failure(last), last)
+        x = found
+    x.c.z[: len(x.z)] = x.z
+    return x
 
 
-def _with_saturation_note(error: NotConverged, model: Model, place: _SearchPoint) -> NotConverged:
+def _with_saturation_note(error: NotConverged, x: RestState) -> NotConverged:
     """Add the names of controllers with an output at its limit to the error."""
-    shot = snapshot(place.state())
+    shot = snapshot(x.equations.state)
     held = [
         e.title
-        for e in model.controllers
+        for e in x.c.structure.model.controllers
         if e.unlimited() is not e and shot.curve(f"{e.name}.output")[1][0] != shot.curve(f"{e.name}.unlimited")[1][0]
     ]
     if held:
@@ -187,42 +146,42 @@ def _with_saturation_note(error: NotConverged, model: Model, place: _SearchPoint
     return error
 
 
-def determined_auxiliary_rest(
-    model: Model, at_rest: Assembly, outputs: Sequence[str]
-) -> tuple[AuxiliaryModel, RestState]:
-    """Auxiliary model at an equilibrium, with the controller states as unknowns beside the positions.
+def determined_rest(at_rest: Assembly) -> RestState:
+    """Equilibrium with the controller states as unknowns beside the positions.
 
     Raises
     ------
     SingularityError
         If the equilibrium is not isolated.
     """
-    c = at_rest.compiled
-    at = dict(zip((x.name for x in c.structure.controls), c.z.tolist(), strict=False))
-    x = MechanismState.resting(c, at_rest.t, at_rest.q)
-    scales = state_scales(model, at, x, places=True)
-    other, rest = auxiliary_rest(model, at, x, scales, outputs)
+    from scipy.linalg import block_diag
+
+    c, s = at_rest.compiled, at_rest.compiled.structure
+    z = c.z[: len(s.controls)].copy()
+    rest = _with_sizes(RestState(c, at_rest.t, at_rest.q, np.zeros(len(s.rows)), z))
     f = free_coordinates(rest.equations)
-    V = f.Zv / rest.scale[:, None] * rest.scale[f.chosen_v]
+    V = block_diag(f.Zv / rest.c.sizes[:, None] * rest.c.sizes[f.chosen_v], np.eye(len(z)))
     S = V.T @ (rest.K @ V)
     for axis in (1, 0):
         size = np.abs(S).max(axis=axis, keepdims=True, initial=0.0)
         S = S / np.where(size > 0.0, size, 1.0)
     _, d, Vt = np.linalg.svd(S)
     if len(d) and not d[-1] > SINGULAR_STIFFNESS * d[0]:
-        weak = in_user_terms(f.names[f.chosen_v[int(np.argmax(np.abs(Vt[-1])))]].name, other)
+        names = [*(f.names[k].name for k in f.chosen_v), *(x.name for x in s.controls)]
+        weak = names[int(np.argmax(np.abs(Vt[-1])))]
         raise SingularityError(
-            f"the equilibrium of {model.name!r} is not determined along {weak!r}: other positions are equilibria too, "
-            "so it has no derivatives; add a spring, a driver or a controller",
+            f"the equilibrium of {s.model.name!r} is not determined along {weak!r}: other positions are equilibria "
+            "too, so it has no derivatives; add a spring, a driver or a controller",
             at_rest.t,
             (weak,),
         )
-    return other, rest
+    return rest
 
 
-def _are_similar(a: dict[str, StateScale], b: dict[str, StateScale]) -> bool:
-    """Whether two sets of scales are similar."""
-    ratios = np.array([(a[k].stride / b[k].stride, a[k].push / b[k].push) for k in a])
+def _are_similar(a: StateSizes, b: StateSizes) -> bool:
+    """Whether two sets of sizes are similar."""
+    rates = [x.energy / np.where(x.rate > 0.0, x.rate, 1.0) for x in (a, b)]
+    ratios = np.r_[a.change / b.change, rates[0] / rates[1]]
     return bool((np.abs(np.log(ratios)) <= np.log(SIMILAR_SCALES)).all())
 
 
@@ -290,12 +249,12 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     for name in ("stable", "preload", "turning"):
         if getattr(o, name):
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
+    refuse_switching_with_controllers(model, "equilibrium knows", "simulate until it rests")
     a = assemble(model, t=o.t, parameters=o.parameters)
     guess, c = _initial_guess(model, o), a.compiled
     begin = _search_start(a, guess)
-    z = (guess or begin).compiled.z.tolist()
-    at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
-    q, way = controlled_rest(model.snapshot(), c, a.t, begin.q, at)
+    z = (guess or begin).compiled.z[: len(c.structure.controls)].copy()
+    q, way = controlled_rest(model.snapshot(), c, a.t, begin.q, z)
     out = equilibrium_result(RestState.at(c, a.t, q), {}, way)
     from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear imports statics
 

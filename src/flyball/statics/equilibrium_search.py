@@ -20,16 +20,16 @@ import numpy as np
 from ..assembly.assembled_state import Assembly
 from ..assembly.positions_and_velocities import row_scales
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.nonsmooth_points import nonsmooth_points
-from ..derivatives.output_derivatives import snapshot
-from ..derivatives.reduced_equations import (
+from ..derivatives.force_balance import (
     force_magnitudes,
-    free_coordinates,
     is_balanced,
     is_balanced_beyond_rounding,
-    prescribed_rows,
     unbalanced_fraction,
 )
+from ..derivatives.nonsmooth_points import nonsmooth_points
+from ..derivatives.output_derivatives import snapshot
+from ..derivatives.reduced_equations import free_coordinates, prescribed_rows
+from ..derivatives.steady_motion import rate_description
 from ..engine.kinematics import retract
 from ..errors import ModelError, NotConverged, SingularityError
 from ..model.joint import Joint
@@ -136,7 +136,7 @@ def equilibrium_there(x: RestState) -> RestState | None:
     """
     if not x.open() <= GAP_TOLERANCE:
         return None
-    best = RestState.at(x.c, x.t, x.q)  # smallest reactions: a self-stress would hide residuals
+    best = x.balanced()  # smallest reactions: a self-stress would hide residuals
     if not best.settled(FORCE_TOLERANCE) or _is_balanced_by_jump(best):
         return None
     refuse_infinitesimal_mechanism(best)
@@ -145,7 +145,7 @@ def equilibrium_there(x: RestState) -> RestState | None:
 
 def _is_balanced_by_jump(x: RestState) -> bool:
     """Whether forces balance only within rounding because a force jumps there."""
-    return not is_balanced_beyond_rounding(x.equations, FORCE_TOLERANCE) and any(
+    return not is_balanced_beyond_rounding(x.equations, FORCE_TOLERANCE, len(x.z) > 0) and any(
         k.jump for k in nonsmooth_points(x.equations)
     )
 
@@ -223,11 +223,22 @@ def pseudo_transient_search(x: RestState) -> tuple[RestState | None, RestState]:
 
 
 def search_failure(x: RestState) -> NotConverged:
-    """The error for a failed search, with the residual forces at its end."""
-    best = RestState.at(x.c, x.t, x.q)
+    """The error for a failed search, with the residual forces and rates at its end."""
+    best = x.balanced()
     names = velocity_names(x.c.structure)
     left = best.equations.block("r")
     residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    states = x.c.structure.controls[: len(x.z)]
+    residuals |= {k.name: float(rate) for k, rate in zip(states, best.equations.state_rates, strict=False)}
+    unrest = np.abs(best.r)
+    if states and unrest[len(names) :].max() >= unrest[: len(names)].max(initial=0.0):
+        what = rate_description(best.equations, int(np.argmax(unrest[len(names) :])))
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {what}, and nothing "
+            f"brings that to rest. Give a better guess, or look whether the controller can change what it measures, "
+            f"its limits considered",
+            residuals,
+        )
     if not free_coordinates(best.equations).Zv.shape[1]:
         what = "their forces do not balance it" if x.open() <= GAP_TOLERANCE else "they do not close any more"
         return NotConverged(
@@ -281,7 +292,7 @@ def refuse_infinitesimal_mechanism(x: RestState) -> None:
     if min(x.G.shape) > DENSE_SIZE and clearly_independent(x.G):  # others change their Jacobian too fast along w
         return
     U, d, Vt = np.linalg.svd(x.G.toarray(), full_matrices=False)
-    force = x.scale * EquationDerivatives(MechanismState.resting(x.c, x.t, x.q)).block("r")
+    force = replace(x, lam=0.0 * x.lam).r
     for u, sigma, w in zip(U.T, d, Vt, strict=True):
         if not ZERO_SINGULAR_VALUE * d[0] < sigma < WEAK_SINGULAR_VALUE * d[0]:
             continue

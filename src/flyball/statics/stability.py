@@ -1,7 +1,8 @@
 """State at rest, and stability of an equilibrium.
 
 `RestState` has the residual forces at a position, the stiffness, and the steps of Newton's method. All quantities are
-energies: translations are divided by the mechanism's length. Stability follows from the constrained stiffness,
+energies: translations are divided by the mechanism's length. Controller states are further unknowns, with their rates
+as residuals, if their sizes are given; else they keep their values. Stability follows from the constrained stiffness,
 direction by direction, with each coordinate in units of the stiffness that acts on it (Sylvester's law of inertia).
 At nonsmooth points an equilibrium is stable if the potential rises on all sides, and unstable if it falls along a
 direction that leads into a side where it falls. Forces without potential are judged by the eigenvalues.
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,18 +21,21 @@ import numpy as np
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..derivatives.eigenvalues import Spectrum, spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points, refuse_nonsmooth
+from ..derivatives.force_balance import (
+    StateSizes,
+    force_magnitudes,
+    is_balanced,
+    stiffness_rounding,
+    unbalanced_fraction,
+)
+from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points
 from ..derivatives.reduced_equations import (
     DENSE_UNKNOWNS,
     FreeCoordinates,
     TurningFrame,
-    force_magnitudes,
     free_coordinates,
-    is_balanced,
     minimum_norm_solution,
     reduced_equations,
-    stiffness_rounding,
-    unbalanced_fraction,
 )
 from ..engine.kinematics import retract
 from ..errors import AnalysisError
@@ -39,6 +43,8 @@ from ..numerics.rank import null_space
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE
 from ..results.modes import largest_growth
 from ..tables.structure_definition import velocity_names
+
+STATE_RANGE = 100.0  # natural size of a step of a controller state, in large changes: steps are limited in length
 
 
 @dataclass
@@ -51,56 +57,78 @@ class RestState:
         In absolute coordinates.
     t : float [s]
     q, lam : ndarray
+    z : ndarray (nz,)
+        Controller states that are unknowns beside the positions; empty if they keep their values in ``c``.
+    sizes : StateSizes
+        Their natural sizes.
     """
 
     c: CompiledMechanism
     t: float
     q: np.ndarray
     lam: np.ndarray
+    z: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sizes: StateSizes = field(default_factory=lambda: StateSizes(np.zeros(0), np.zeros(0), 1.0))
     known_stability: Any = field(default=None, repr=False)  # stability, stored when first computed
 
     @classmethod
     def at(cls, c: CompiledMechanism, t: float, q: np.ndarray) -> RestState:
         """State with the multipliers that balance the forces best."""
-        bare = cls(c, t, q, np.zeros(len(c.structure.rows)))
-        return cls(c, t, q, bare.balancing_multipliers())
+        return cls(c, t, q, np.zeros(len(c.structure.rows))).balanced()
+
+    def balanced(self) -> RestState:
+        """This state with the smallest multipliers that balance the forces best."""
+        bare = replace(self, lam=0.0 * self.lam, known_stability=None)
+        return replace(bare, lam=bare.balancing_multipliers())
 
     @cached_property
     def equations(self) -> EquationDerivatives:
         """Equations of motion and their derivatives at this state."""
+        self.c.z[: len(self.z)] = self.z
         return EquationDerivatives(MechanismState.resting(self.c, self.t, self.q, self.lam))
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Natural size of a step along every velocity: the mechanism's length, or 1 rad."""
-        return self.c.sizes
+        """Natural size of a step along every velocity (the mechanism's length, or 1 rad), and of every state."""
+        return np.r_[self.c.sizes, STATE_RANGE * self.sizes.change]
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Factors of the residuals that make them energies: `scale` for forces."""
+        return np.r_[self.c.sizes, self.sizes.energy / np.where(self.sizes.rate > 0.0, self.sizes.rate, 1.0)]
 
     @cached_property
     def G(self):
         """Jacobian of all constraints, including those on velocities, with unit rows; sparse."""
         import scipy.sparse as sp
 
-        return sp.diags(self.row_scale) @ self.equations.by_velocity[self.equations.at["n"]] @ sp.diags(self.scale)
+        G = self.equations.by_velocity[self.equations.at["n"]]
+        G = sp.diags(self.row_scale) @ G @ sp.diags(self.c.sizes)
+        return sp.hstack([G, sp.csr_matrix((G.shape[0], len(self.z)))]).tocsr() if len(self.z) else G
 
     @cached_property
     def row_scale(self) -> np.ndarray:
         """Factors that scale the rows to unit norm."""
         G = self.equations.by_velocity[self.equations.at["n"]]
-        size = np.sqrt(np.asarray((G.multiply(G)) @ (self.scale**2)).ravel())
+        size = np.sqrt(np.asarray((G.multiply(G)) @ (self.c.sizes**2)).ravel())
         return 1.0 / np.where(size > 0.0, size, 1.0)
 
     @cached_property
     def K(self):
-        """Scaled stiffness, sparse."""
+        """Scaled stiffness, and derivatives of and by the unknown controller states; sparse."""
         import scipy.sparse as sp
 
-        d = sp.diags(self.scale)
-        return d @ self.equations.by_position[self.equations.at["r"]] @ d
+        e = self.equations
+        K = e.by_position[e.at["r"]]
+        if len(self.z):
+            K = sp.bmat([[K, e.by_state[e.at["r"]]], [-e.by_position[e.at["s"]], -e.state_jacobian]]).tocsr()
+        return sp.diags(self.weight) @ K @ sp.diags(self.scale)
 
     @cached_property
     def r(self) -> np.ndarray:
-        """Scaled residual forces with these multipliers."""
-        return self.scale * self.equations.block("r")
+        """Scaled residual forces with these multipliers, and negative rates of the unknown controller states."""
+        e = self.equations
+        return self.weight * np.r_[e.block("r"), -e.state_rates[: len(self.z)]]
 
     @cached_property
     def g(self) -> np.ndarray:
@@ -111,21 +139,24 @@ class RestState:
     @cached_property
     def size(self) -> float:
         """Largest energy of the forces, or of the stiffness, for a unit step."""
-        most = np.abs(self.scale * force_magnitudes(self.equations)).max(initial=0.0)
+        e = self.equations
+        acts = np.r_[force_magnitudes(e), e.state_rates[: len(self.z)]]
+        most = np.abs(self.weight * acts).max(initial=0.0)
         return float(max(most, np.abs(self.K.data).max(initial=0.0), 1e-300))
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """Which velocities are rotations, (nv,) bool."""
-        return np.array([n.unit == "rad" for n in velocity_names(self.c.structure)], bool)
+        """Which unknowns are rotations, bool."""
+        units = [n.unit for n in velocity_names(self.c.structure)]
+        return np.r_[[u == "rad" for u in units], np.zeros(len(self.z), bool)].astype(bool)
 
     def residual_size(self) -> float:
         """Largest residual force relative to the applied forces, plus the largest constraint gap."""
         return float(np.abs(self.r).max(initial=0.0) / self.size + np.abs(self.g).max(initial=0.0))
 
     def settled(self, part: float) -> bool:
-        """Whether every residual is below ``part`` of the forces in its equation plus rounding."""
-        return is_balanced(self.equations, part)
+        """Whether every residual is below ``part`` of the forces in its equation plus rounding, and states rest."""
+        return is_balanced(self.equations, part, len(self.z) > 0)
 
     def unbalanced(self) -> float:
         """Largest residual with the best multipliers, relative to the forces of its equation."""
@@ -137,7 +168,7 @@ class RestState:
         force = -f.Zv.T @ self.equations.block("r")
         if not len(force):
             return "no force"
-        size = self.scale[f.chosen_v]
+        size = self.c.sizes[f.chosen_v]
         k = int(np.argmax(np.abs(force * size)))
         name = f.names[f.chosen_v[k]]
         return f"{force[k]:.3g} {'N' if name.unit == 'm' else 'N*m'} push along {name.name}"
@@ -150,7 +181,8 @@ class RestState:
         """Multipliers with the smallest residual forces."""
         if not len(self.g):
             return self.lam
-        return self.lam + self.row_scale * minimum_norm_solution(self.G.T, self.r)
+        nv = len(self.c.sizes)
+        return self.lam + self.row_scale * minimum_norm_solution(self.G[:, :nv].T, self.r[:nv])
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Scaled step of Newton's method and change of the multipliers, with ``damping`` times the identity added.
@@ -168,8 +200,8 @@ class RestState:
             raise
 
     def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of positions and multipliers that compensate changes r and g of the equations."""
-        step, lam = self._solve(self.scale * r, self.row_scale * g, 0.0)
+        """Changes of positions (and states) and multipliers that compensate changes r and g of the equations."""
+        step, lam = self._solve(self.weight * r, self.row_scale * g, 0.0)
         return self.scale * step, lam
 
     def _solve(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
@@ -212,9 +244,9 @@ class RestState:
 
     def moved(self, step: np.ndarray, lam: np.ndarray) -> RestState:
         """State after a scaled step."""
-        q = self.q.copy()
-        retract(self.c.values.system, q, self.scale * step)
-        return RestState(self.c, self.t, q, self.lam + lam)
+        q, change = self.q.copy(), self.scale * step
+        retract(self.c.values.system, q, change[: len(self.c.sizes)])
+        return replace(self, q=q, lam=self.lam + lam, z=self.z + change[len(self.c.sizes) :], known_stability=None)
 
     def closed(self) -> RestState:
         """State projected onto the constraints, with the multipliers that balance best."""
@@ -223,7 +255,7 @@ class RestState:
             if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
                 break
             now = now.moved(minimum_norm_solution(now.G, -now.g), 0.0 * now.lam)
-        return RestState.at(now.c, now.t, now.q)
+        return now.balanced()
 
 
 NEUTRAL_STIFFNESS = 1e-8  # stiffness below this part of its terms counts as zero
@@ -427,7 +459,9 @@ def _computed_stability(x: RestState) -> Stability:
     if not f.Zv.shape[1]:
         return Stability(STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf)
     still = 0.0 * f.Zv
-    found = [k for k in nonsmooth_points(e) if k.is_crossed_by(f.Zv * f.scale[f.chosen_v], still)]
+    states = [k.name for k in x.c.structure.model.controllers]  # keep their values
+    points = [k for k in nonsmooth_points(e) if k.element not in states]
+    found = [k for k in points if k.is_crossed_by(f.Zv * f.scale[f.chosen_v], still)]
     if found:
         kind, s = one_sided_stability(x, f, found)
         k = int(np.argmin(s.parts))
@@ -437,7 +471,8 @@ def _computed_stability(x: RestState) -> Stability:
     k = int(np.argmin(s.parts))
     kind = UNSTABLE if s.parts[k] < -NEUTRAL_STIFFNESS else MARGINAL if s.parts[k] <= NEUTRAL_STIFFNESS else STABLE
     if not s.potential:  # flutter follows from the eigenvalues only
-        refuse_nonsmooth(e, still, f.Zv)
+        if moved := [k for k in points if k.is_crossed_by(still, f.Zv)]:
+            raise nonsmooth_error(moved, x.t, "there are no linear equations")
         kind = _stability_by_motion(e, f)
     elif kind == STABLE and _has_negative_damping(e, f) and _stability_by_motion(e, f) == UNSTABLE:
         kind = UNSTABLE

@@ -124,7 +124,7 @@ def fill_force_table(s: Structure) -> None:
         else:
             table.F[k], table.M[k] = frame_index(s, e, "F") if "F" in e.ends() else 0, frame_index(s, e, "M")
         _compile_laws(s, e, table.laws[k])
-        if not e.conservative() and e.name not in s.model.aside:
+        if not e.conservative():
             table.work[k] = s.state(f"{e.name}.work")
     s.tables["forces"] = table
 

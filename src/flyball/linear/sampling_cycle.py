@@ -1,0 +1,165 @@
+"""Linear equations of mechanisms with sampled controllers, from one sampling instant to the next.
+
+Between sampling instants x' = A x + B u, with the held signals among the states. At an instant signals are updated one
+after the other, then all states at once. Over one period this is the zero-order-hold model (Astrom and Wittenmark,
+*Computer-Controlled Systems*, 1997, sections 2.3 and 8.4).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from ..derivatives.eigenvalues import Spectrum, spectrum
+from ..derivatives.reduced_equations import MatrixUncertainty
+from ..errors import ModelError
+from ..results.linear_model import StateSpace
+
+PERIOD_TOLERANCE = 1e-9  # relative deviation allowed from a common period
+MAX_INSTANTS = 10_000  # largest denominator of a ratio of periods, and largest number of instants in a cycle
+# Largest deviation of a held value from its law at rest, relative to its size or a large change of it.
+SETTLED_TOLERANCE = 1e-6
+
+EXPONENTIAL_ROUNDING = (
+    4.0 * np.finfo(float).eps
+)  # uncertainty of matrix exponentials, relative to the largest entry of a row
+
+
+class SampledSignal(NamedTuple):
+    """A sampled signal or state.
+
+    Attributes
+    ----------
+    name : str
+        Name of the state of the linear equations that stores its held value.
+    output : int
+        Index of the output of the linear equations with the value of its law.
+    clock : tuple of float
+        Period and offset [s].
+    signal : bool
+        Whether it is a signal, which is updated before the states of the same instant.
+    """
+
+    name: str
+    output: int
+    clock: tuple[float, float]
+    signal: bool
+
+
+def sampling_instants(
+    clocks: Sequence[tuple[float, float]],
+) -> tuple[float, list[tuple[float, list[tuple[float, float]]]]]:
+    """Length of the cycle [s], and its instants with the clocks that sample at each.
+
+    Raises
+    ------
+    ModelError
+        If periods have no common multiple.
+    """
+    clocks = sorted(set(clocks))
+    least = min(period for period, _ in clocks)
+    parts = [Fraction(period / least).limit_denominator(MAX_INSTANTS) for period, _ in clocks]
+    for (period, _), part in zip(clocks, parts, strict=True):
+        if abs(float(part) * least - period) > PERIOD_TOLERANCE * least:
+            raise ModelError(
+                f"periods {least:g} s and {period:g} s of sampled controllers have no common multiple, so that there "
+                f"is no cycle from which to tell small motions; give one that is a simple multiple of the other"
+            )
+    whole = math.lcm(*(p.numerator for p in parts)) // math.gcd(*(p.denominator for p in parts))
+    whole = next(n for n in (whole * k for k in range(1, MAX_INSTANTS)) if all((n / p).denominator == 1 for p in parts))
+    cycle = least * whole
+    if sum(round(cycle / period) for period, _ in clocks) > MAX_INSTANTS:
+        raise ModelError(
+            f"the cycle of the sampled controllers is {cycle:g} s long, with more than {MAX_INSTANTS} instants"
+        )
+    first = min(offset for _, offset in clocks)
+    due = sorted(
+        ((offset - first) % period + k * period, clock)
+        for clock in clocks
+        for period, offset in [clock]
+        for k in range(round(cycle / period))
+    )
+    found: list[tuple[float, list[tuple[float, float]]]] = []
+    for t, clock in due:
+        if found and t - found[-1][0] <= PERIOD_TOLERANCE * least:
+            found[-1][1].append(clock)
+        elif cycle - t > PERIOD_TOLERANCE * least:
+            found.append((t, [clock]))
+        else:  # equal to the start of the cycle, within rounding
+            found[0][1].append(clock)
+    return cycle, found
+
+
+def refuse_unsettled(
+    samples: Sequence[SampledSignal], at: np.ndarray, law: np.ndarray, sizes: np.ndarray, name: str
+) -> None:
+    """Refuse a state in which a held value changes at the next sample; ``sizes`` are its large changes."""
+    for s, held, next_one, size in zip(samples, at.tolist(), law.tolist(), sizes.tolist(), strict=True):
+        if not abs(next_one - held) <= SETTLED_TOLERANCE * max(size, abs(held)):
+            raise ModelError(
+                f"{name!r} does not rest there: {s.name!r} is {held:.6g}, and {next_one:.6g} when it is sampled next; "
+                f"ask about an equilibrium, about=m.equilibrium(), or about the end of a motion that has settled"
+            )
+
+
+def cycle_equations(
+    space: StateSpace, samples: Sequence[SampledSignal], outputs: int
+) -> tuple[StateSpace, Spectrum, float]:
+    """Difference equations over one cycle, their eigenvalues (multipliers), and the length of the cycle [s].
+
+    The state is that just before the first instant of the cycle; outputs and inputs are those just after it. See
+    `SampledSignal`.
+    """
+    cycle, due = sampling_instants([s.clock for s in samples])
+    n, m = len(space.A), space.B.shape[1]
+    X = np.hstack([np.eye(n), np.zeros((n, m))])
+    U = np.hstack([np.zeros((m, n)), np.eye(m)])
+    C = np.hstack([space.C[:outputs], space.D[:outputs]])
+    for k, (t, clocks) in enumerate(due):
+        for own in _update_groups([s for s in samples if s.clock in clocks]):
+            at = [space.states.index(s.name) for s in own]
+            laws = [s.output for s in own]
+            X[at] = space.C[laws] @ X + space.D[laws] @ U
+        if k == 0:
+            Y = C[:, :n] @ X + C[:, n:] @ U
+        X = _advanced_by_exponential(space, (due[k + 1][0] if k + 1 < len(due) else cycle) - t, X, U)
+    A, B = X[:, :n], X[:, n:]
+    left = _needed_states(A, Y[:, :n], [space.states.index(s.name) for s in samples])
+    names = tuple(space.states[i] for i in left)
+    out = replace(
+        space, A=A[np.ix_(left, left)], B=B[left], C=Y[:, left], D=Y[:, n:], states=names,
+        state_units=tuple(space.state_units[i] for i in left), motion=space.motion[:, left],
+    )  # fmt: skip
+    rounded = EXPONENTIAL_ROUNDING * np.abs(out.A).max(axis=1, keepdims=True, initial=0.0) * np.ones(len(left))
+    found = spectrum(out.A, MatrixUncertainty(np.eye(len(left)), rounded))
+    return replace(out, eigenvalues=found.values), found, cycle
+
+
+def _update_groups(due: list[SampledSignal]) -> Iterator[list[SampledSignal]]:
+    """Groups that are updated together: each signal by itself, then all states."""
+    yield from ([s] for s in due if s.signal)
+    yield [s for s in due if not s.signal]
+
+
+def _advanced_by_exponential(space: StateSpace, h: float, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+    """Advance the state by a time ``h`` with constant inputs."""
+    from scipy.linalg import expm
+
+    n, m = space.B.shape
+    E = expm(h * np.block([[space.A, space.B], [np.zeros((m, n + m))]]))
+    return np.asarray(E[:n, :n] @ X + E[:n, n:] @ U)
+
+
+def _needed_states(A: np.ndarray, C: np.ndarray, held: Sequence[int]) -> np.ndarray:
+    """Indices of states without unused held ones: signals that are sampled anew at the start of the cycle."""
+    left = np.ones(len(A), bool)
+    while True:
+        gone = [i for i in held if left[i] and not A[left, i].any() and not C[:, i].any()]
+        if not gone:
+            return np.flatnonzero(left)
+        left[gone] = False
