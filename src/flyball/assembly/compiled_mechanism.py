@@ -28,7 +28,7 @@ from ..tables.forest import tree_joint_steps
 from ..tables.law_inputs import initial_controller_states
 from ..tables.reference_configuration import BodyState, positions
 from ..tables.structure import Choices, structure
-from ..tables.structure_definition import Structure, velocity_names
+from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, Work, assign
 from ..tables.values import Values, values
 
@@ -129,7 +129,7 @@ class CompiledMechanism:
     @property
     def sizes(self) -> np.ndarray:
         """Reference length along every velocity: the mechanism's length [m], or a radian, (nv,)."""
-        return np.array([self.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.structure)])
+        return self.values.system.velocity_units.real.copy()
 
     @cached_property
     def metric(self) -> np.ndarray:

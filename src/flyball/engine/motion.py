@@ -403,7 +403,7 @@ def write_row(t, y, out, S, W):
     nv = W.velocities.solved.shape[0]
     ny = y.shape[0]
     if S.rows.law.shape[0] > 0:
-        W.options.position_violation = max(W.options.position_violation, position_violation(W, W.rows.scratch_2))
+        W.options.position_violation = max(W.options.position_violation, position_violation(S, W, W.rows.scratch_2))
         W.options.velocity_violation = max(
             W.options.velocity_violation, velocity_violation(S, W, y[nq : nq + nv], W.rows.scratch_2)[0]
         )

@@ -336,10 +336,10 @@ def characteristic_rate(S, m):
 
 @formula
 def largest_measured_rate(S, W):
-    """Largest measured rate."""
+    """Largest measured rate, relative to the unit of its quantity."""
     fastest = 0.0
     for m in range(count_measured(S)):
-        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+        fastest = max(fastest, magnitude(W.sensed[RATE, m]) / S.units[m])
     return fastest
 
 

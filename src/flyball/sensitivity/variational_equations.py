@@ -242,6 +242,9 @@ class VariationalIntegration:
         at, more = self.nq + self.nv, 2 * self.nv * n
         y = self.start.y
         Y[0, :at], Y[0, at : at + more], Y[0, at + more : at + more + self.nz] = y[:at], changes.ravel(), y[at:]
+        unit, v_unit = own.y[ex.UNIT], self.c.values.system.velocity_units
+        rates = np.concatenate([v_unit, unit[self.nq : at]])
+        Y[ex.UNIT, :at], Y[ex.UNIT, at : at + more], Y[ex.UNIT, at + more :] = unit[:at], np.tile(rates, n), 1.0
         accounts = [own.integrals + more + k * self.nz for k in range(n + 1)]
         count = own.count.copy()
         count.controlled = at + more

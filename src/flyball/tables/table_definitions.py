@@ -275,6 +275,8 @@ class System(NamedTuple):
     gravity: Number1  # (3,) [m/s^2]
     scales: Scales
     units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
+    velocity_units: Number1  # (nv,): the same of each coordinate whose rate is a velocity
+    row_levers: Number1  # (nr,): factor that turns the value of a row into a length: 1, or of angles the length [m]
     mass_entries: MassEntries
     pairs: Pairs
     blocks: Blocks
@@ -284,6 +286,7 @@ class System(NamedTuple):
 
 NUMBERS = (
     "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
+    "velocity_units", "row_levers",
 )  # fmt: skip
 """Fields of `System` that hold floats: they change with parameters, and may be complex, or expressions."""
 
