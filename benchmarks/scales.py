@@ -85,7 +85,7 @@ def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) ->
     try:
         run = m.simulate(t_end, **in_units(chosen, s))
     except fb.FlyballError as error:
-        return {"error": type(error).__name__}
+        return {"error": type(error).__name__, "message": str(error)}
     out: dict[str, Any] = {"t": run.t / s.time}
     out["events"] = [f"{e.name} {e.kind}" for e in run.events]
     out["event times"] = np.array([e.t for e in run.events]) / s.time
@@ -105,6 +105,8 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
     out = [f"{k} is in one result only" for k in one.keys() ^ other.keys()]
     for k in one.keys() & other.keys():
         a, b = one[k], other[k]
+        if k == "message":
+            continue
         if not isinstance(a, np.ndarray):
             out += [f"{k}: {a!r:.60} and {b!r:.60}"] if a != b else []
         elif a.shape != b.shape:
@@ -129,6 +131,7 @@ def compared(made: Made, names: list[str]) -> Iterator[tuple[str, list[str] | st
             yield name, str(why)
             continue
         own = own or answers(scaled(m, Scale()), t_end, options, Scale())
+        if "error" in own and os.environ.get("DBG"): print(own["error"], own["message"][:150])
         yield name, differences(own, answers(other, t_end * s.time, options, s))
 
 

@@ -133,12 +133,17 @@ class CompiledMechanism:
 
     @cached_property
     def metric(self) -> np.ndarray:
-        """Whether the value of a row is a length [m]; else it is an angle or a cosine, (nr,)."""
+        """Whether the value of a row is a length [m] or contains one; else it is an angle or a cosine, (nr,)."""
         out = np.zeros(len(self.structure.rows), bool)
         for t in self.structure.terms:
             if not t.measured:
-                out[t.row] = t.formula.measure == "m"
+                out[t.row] |= t.formula.measure == "m"
         return out
+
+    @cached_property
+    def row_units(self) -> np.ndarray:
+        """Unit of the value of every row: the mechanism's length or a radian, by the largest factor of its terms."""
+        return self.values.length / self.values.system.row_levers.real
 
     @cached_property
     def has_curves(self) -> bool:

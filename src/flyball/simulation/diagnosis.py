@@ -235,7 +235,7 @@ def acceleration_residual(
     turning = np.zeros(n)
     np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
     asked = times(abs(G), np.abs(_unconstrained_accelerations(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
-    metre = np.where(c.metric, c.values.length, 1.0)
+    metre = c.row_units
     size = asked + times(abs(G), np.abs(x))
     return np.abs(times(G, x) - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
 
