@@ -26,7 +26,9 @@ from fuzzing import content
 from fuzzing.scaling import Scale, Unsupported, scaled
 
 import flyball as fb
+from flyball.simulation.integration_options import BAUMGARTE_RATE
 
+UNDERFLOW = 1e-290  # smaller numbers are equal: near the smallest ones that there are, digits are lost
 SCALES = {
     "mass up": Scale(mass=2.0**20), "mass down": Scale(mass=2.0**-20),
     "time up": Scale(time=2.0**10), "time down": Scale(time=2.0**-10),
@@ -66,9 +68,9 @@ def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
     for name in ("max_step", "step"):
         if out.get(name) is not None:
             out[name] = out[name] * s.time
-    for name in ("alpha", "beta"):
-        if out.get(name) is not None:
-            out[name] = out[name] / s.time
+    if out.get("stabilization") == "baumgarte":  # its default rates are 10/s
+        for name in ("alpha", "beta"):
+            out[name] = (out.get(name) or BAUMGARTE_RATE) / s.time
     if isinstance(method := out.get("method"), fb.Stepping):
         changed = {"step": None if method.step is None else method.step * s.time}
         if method.tolerance is not None:
@@ -94,7 +96,8 @@ def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) ->
     out["warnings"] = len(run.health.warnings)
     for name, (unit, values) in run.channels().items():
         try:
-            out[name] = np.asarray(values) / s.of(unit)
+            curve = np.asarray(values) / s.of(unit)
+            out[name] = np.where(np.abs(curve) < UNDERFLOW, 0.0, curve)
         except KeyError:
             continue
     return out
