@@ -113,23 +113,23 @@ def switch_guard(S, W, t, kind, s):
         return pressed_guard(S, W, s, kind, way - FROZEN)
     if kind == G_TURNS and S.switches.partner[s] < 0 and is_sliding(S, W, s):
         m = S.switches.measured[s]
-        return way * significant_rate(S, m, W.sensed[RATE, m])
+        return way * significant_rate(S, W, m, W.sensed[RATE, m])
     if kind >= G_CONE:
         return contact_guard(S, W, W.sensed, W.rows.multiplier, kind, s)
     m, k = S.switches.measured[s], S.switches.row[s]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.modes.mode[s] == OFF:
         if kind == G_LOWER:
-            return stop_distance(S, m, x - W.modes.lower[s], rate)
+            return stop_distance(S, W, m, x - W.modes.lower[s], rate)
         if kind == G_UPPER:
-            return stop_distance(S, m, W.modes.upper[s] - x, -rate)
+            return stop_distance(S, W, m, W.modes.upper[s] - x, -rate)
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return INACTIVE_GUARD
-            late = TURN * characteristic_rate(S, m) if S.switches.kind[s] == RATCHET else 0.0
-            return way * significant_rate(S, m, rate) + late
+            late = TURN * characteristic_rate(S, W, m) if S.switches.kind[s] == RATCHET else 0.0
+            return way * significant_rate(S, W, m, rate) + late
         if kind == G_BACK:
-            return significant_rate(S, m, rate)
+            return significant_rate(S, W, m, rate)
         return INACTIVE_GUARD
     if kind == G_PULL:
         return way * W.rows.multiplier[k]
@@ -139,20 +139,20 @@ def switch_guard(S, W, t, kind, s):
 
 
 @formula
-def significant_rate(S, m, rate):
+def significant_rate(S, W, m, rate):
     """Rate of quantity m, or 0 where it is only rounding.
 
     That is so for a quantity that does not move or is held by constraints.
     """
-    return 0.0 if magnitude(rate) <= CREEP_RATE * characteristic_rate(S, m) else rate
+    return 0.0 if magnitude(rate) <= CREEP_RATE * characteristic_rate(S, W, m) else rate
 
 
 @formula
-def stop_distance(S, m, x, rate):
+def stop_distance(S, W, m, x, rate):
     """Distance of quantity m from a stop, or 0 where it is only rounding, as at separation with zero speed."""
     return (
         0.0
-        if magnitude(x) <= POSITION_ROUNDING * S.units[m] and rate >= -RESTING_RATE * characteristic_rate(S, m)
+        if magnitude(x) <= POSITION_ROUNDING * S.units[m] and rate >= -RESTING_RATE * characteristic_rate(S, W, m)
         else x
     )
 
@@ -175,7 +175,7 @@ def guard_rounding(S, W, t, trial, so_far, out):
             out[g] = POSITION_ROUNDING * max(S.units[m], magnitude(W.sensed[VALUE, m]))
         elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0):
             m = S.switches.measured[of]
-            out[g] = max(RELATIVE_ROUNDING * fastest * S.units[m], POSITION_ROUNDING * characteristic_rate(S, m))
+            out[g] = max(RELATIVE_ROUNDING * fastest * S.units[m], POSITION_ROUNDING * characteristic_rate(S, W, m))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             k = S.switches.row[of]
             out[g] = RELATIVE_ROUNDING * strongest * S.row_levers[k] if k >= 0 else 0.0
@@ -204,7 +204,7 @@ def law_rounding(S, W, t, at, trial, most_of):
             continue
         x, dx = W.sensed[VALUE, m], 0.0
         if m < 2 * nm:
-            least = S.units[m] if m < nm else S.units[m - nm] * max(most_of[0], most_of[1] * S.scales.rate)
+            least = S.units[m] if m < nm else S.units[m - nm] * max(most_of[0], most_of[1] * W.options.rate)
             dx = POSITION_ROUNDING * max(magnitude(x), least)
         elif m >= first and m < last:
             dx = RELATIVE_ROUNDING * most_of[2]
@@ -255,7 +255,7 @@ def corner_terms(S, W, t, s, fastest):
             if m < nm:
                 x = max(x, S.units[m])
             elif m < 2 * nm:
-                x = max(x, fastest * S.units[m - nm], characteristic_rate(S, m - nm))
+                x = max(x, fastest * S.units[m - nm], characteristic_rate(S, W, m - nm))
             size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
     return size
 

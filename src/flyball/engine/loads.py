@@ -82,7 +82,7 @@ def sliding_direction(S, W, sensed, s):
         return way, 0.0 * way, u * way
     side = sensed[VALUE, direction_column(S, W, other)]
     v = sensed[RATE, S.switches.measured[other]]
-    return direction_in_space(characteristic_speed(S), (way, side), (u, v))
+    return direction_in_space(characteristic_speed(S, W), (way, side), (u, v))
 
 
 @formula
@@ -170,7 +170,7 @@ def contact_guard(S, W, sensed, lam, kind, s):
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURN_COSINE * speed
     if size * size > ONSET_LENGTH:
-        pace = characteristic_speed(S)
+        pace = characteristic_speed(S, W)
         return min(turned + REVERSAL_SPEED * pace, ONSET_END * ONSET_SPEED * pace - speed)
     return turned
 
@@ -282,9 +282,9 @@ def wrench_power(F, M, force, torque):
 
 
 @formula
-def rest_rate(S, m):
+def rest_rate(S, W, m):
     """Rate of quantity m up to which sliding counts as rest."""
-    return REST_SPEED * characteristic_rate(S, m).real
+    return REST_SPEED * characteristic_rate(S, W, m)
 
 
 @formula
@@ -295,7 +295,7 @@ def sliding_sign(S, W, k, rate):
         return sign(rate)
     told = W.sensed[VALUE, direction_column(S, W, s)]
     if told.real == BY_RATE:
-        return sign(rate) if magnitude(rate) > rest_rate(S, S.forces.F[k]) else 0.0 * told
+        return sign(rate) if magnitude(rate) > rest_rate(S, W, S.forces.F[k]) else 0.0 * told
     return told
 
 

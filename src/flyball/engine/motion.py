@@ -188,7 +188,7 @@ def prescribed_deviation(S, W, t, q, v):
             if S.tree.joint[b] == REVOLUTE:  # whole turns are those of the law
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
-            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.scales.rate + magnitude(f1))
+            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * W.options.rate + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
 

@@ -155,7 +155,7 @@ def effort_slopes(S, W, t, k, out):
     m = S.forces.F[k]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     d = DIFFERENCE_STEP * S.units[m]
-    e = d * S.scales.rate + DIFFERENCE_STEP * abs(rate)
+    e = d * W.options.rate + DIFFERENCE_STEP * abs(rate)
     pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     for j in range(5):
         dx = d if j == 1 else -d if j == 2 else 0.0
@@ -175,7 +175,7 @@ def wrench_slopes(S, W, t, k, out):
     par = force_row(S.force_parameters, k)
     F = load_record(W.FK, S.forces.F[k])
     p, R, w, v, alpha, a = load_record(W.FK, S.forces.M[k])
-    speed = S.scales.length * S.scales.rate + norm(sub(v, F[3]))
+    speed = S.scales.length * W.options.rate + norm(sub(v, F[3]))
     n = int(out[k, DIRECTIONS])
     for j in range(4 * n):
         i = j // 4

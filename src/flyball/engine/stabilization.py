@@ -119,11 +119,13 @@ def velocity_violation(S, W, v, out):
     size = 0.0
     for k in range(out.shape[0]):
         r = W.rows.nu[k]
+        largest = 0.0
         for e in range(S.row_start[k], S.row_start[k + 1]):
             p = W.G[e] * v[S.column[e]]
             r -= p
-            size = larger(size, magnitude(p) * S.row_levers[k])
+            largest = larger(largest, magnitude(p))
         out[k] = r
+        size = larger(size, largest * S.row_levers[k])
         worst = larger(worst, magnitude(r) * S.row_levers[k])
     return worst, size
 
@@ -220,7 +222,7 @@ def project_velocities(S, W, v, tol_v, factored):
     step = W.velocities.scratch_3
     r = W.rows.scratch_2
     worst, size = velocity_violation(S, W, v, r)
-    if worst > tol_v * (characteristic_speed(S) + size):
+    if worst > tol_v * (characteristic_speed(S, W) + size):
         if factored == FACTOR_NEAR:
             reuse_factor(S, W)
         if (
@@ -234,7 +236,7 @@ def project_velocities(S, W, v, tol_v, factored):
             solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    return 0, worst / (characteristic_speed(S) + size), factored
+    return 0, worst / (characteristic_speed(S, W) + size), factored
 
 
 @formula

@@ -15,6 +15,7 @@ from ..assembly.compiled_mechanism import CompiledMechanism
 from ..constraints.switch_kinds import BRANCH, FRICTION
 from ..engine.entry_point import FOLLOW, INTEGRATE
 from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
+from ..engine.rows import characteristic_rate_within
 from ..engine.stabilization import TIGHT_G, TIGHT_V
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
 from ..laws.breakpoints import NO_BREAKPOINTS
@@ -282,7 +283,10 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> Non
     """Set the units of the state, the energy scale and the tolerances on the constraints."""
     real, length = clock.real, c.values.length
     real.energy_size = energy_scale(base, float(real.span))
-    clock.y[ex.UNIT] = state_units(c, clock.y.shape[1])
+    rate = c.array("options").rate = characteristic_rate_within(c.values.system, float(real.span))
+    nq, nv = c.structure.nq, c.structure.nv
+    clock.y[ex.UNIT] = c.values.kept.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
+    clock.y[ex.UNIT, nq : nq + nv] *= rate
     loose = real.atol + real.rtol
     near = loose * min(1.0, loose / TIGHT_TOLERANCE)
     c.array("options").position_tolerance = length * min(COARSEST_POSITIONS, max(TIGHT_G, STAGE_POSITIONS * near))
@@ -292,14 +296,14 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> Non
 def state_units(c: CompiledMechanism, width: int) -> np.ndarray:
     """Return the unit of every component of the state.
 
-    It is the mechanism's length or a radian, of velocities times the characteristic rate; 1 of what follows them.
+    It is the mechanism's length or a radian, the same per second for velocities, and 1 of what follows them.
     """
     S, nq = c.values.system, c.structure.nq
     out = np.ones(width)
     for kind, q, v, nv in zip(S.tree.joint, S.tree.q, S.tree.v, S.tree.nv, strict=True):
         shifts = 3 if kind == FREE else 0 if kind == SPHERICAL else nv  # the others are quaternions
         out[q : q + shifts] = S.velocity_units[v : v + shifts]
-    out[nq : nq + c.structure.nv] = S.velocity_units * S.scales.rate
+    out[nq : nq + c.structure.nv] = S.velocity_units
     return out
 
 

@@ -465,7 +465,7 @@ class _StateSizes:
         self.rate = np.abs(e.state.vdot[at])  # acceleration of 1 kg by 1 N
         among = abs(K[own][:, own]).multiply(size[own]).multiply(size[own][:, None])
         inertia = float((size**2 * M)[own].max(initial=0.0))
-        pace = float(c.values.system.scales.rate.real)
+        pace = float(c.work.options.rate)
         self.energy = _energy_scale(e, float(among.max() if among.nnz else 0.0), size * own) or inertia * pace**2 or 1.0
         self.speed = np.sqrt(self.energy / inertia) if inertia > 0.0 else 1.0  # [1/s]
         self.forces = _largest_entries(abs(K[own][:, at]).multiply(size[own][:, None]), 0)  # forces per unit state

@@ -241,7 +241,7 @@ class Scales(Record, kind="Number"):
     regularization: float  # of the solve, relative
     semidefinite: float  # 1 if some mass or inertia is zero, else 0
     length: float  # a typical length [m]
-    rate: float  # characteristic rate [1/s]
+    rate: float  # characteristic rate [1/s]; 0 if neither gravity nor a speed determines it
 
 
 class System(NamedTuple):
@@ -383,6 +383,7 @@ class Options(Record, kind="Float"):
     partitioned: float  # whether solves are for the dependent coordinates only
     deferred: float  # whether accelerations at output times are computed only when needed
     placed: float  # whether only positions and velocities are needed
+    rate: float  # characteristic rate [1/s]: that of the tables, or one per duration of the motion
 
 
 class Counts(Record, kind="Int"):

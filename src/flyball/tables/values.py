@@ -34,13 +34,11 @@ from .reference_configuration import BodyState, Poses, Refresh, free_velocities,
 from .structure_definition import Structure, TermSpec, velocity_names
 from .table_definitions import FLAT, Frames, Scales, SwitchNumbers, System, zero_table
 
-DEFAULT_RATE = 1.0  # [1/s]: where there is neither gravity nor any speed
-
 
 def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray, length: Any) -> Any:
     """Characteristic rate [1/s]: half swings of a pendulum of the typical length, sqrt(g / length) / pi.
 
-    Without gravity: the fastest body or coordinate at the start, speed per length or angular speed; 1/s if all are at
+    Without gravity: the fastest body or coordinate at the start, speed per length or angular speed; 0 if all are at
     rest.
     """
     if (g := _norm(gravity)).real > 0.0:
@@ -52,8 +50,7 @@ def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray
             unit = model.unit(e.name, e)
             size = _norm(np.array([number(rate, given.env, f"{unit}/s", f"rate of {e.title}"), 0.0, 0.0]))
             speeds.append(size / length if unit == "m" else size)
-    fastest = max(speeds, key=lambda x: x.real, default=0.0)
-    return fastest if fastest.real > 0.0 else DEFAULT_RATE
+    return max(speeds, key=lambda x: x.real, default=0.0)
 
 
 def _norm(x: np.ndarray) -> Any:
