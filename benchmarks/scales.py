@@ -82,7 +82,7 @@ def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
 def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) -> dict[str, Any]:
     """Everything a motion says, in the units before scaling: arrays, and texts without numbers."""
     chosen = {"outputs": OUTPUTS, "progress": False} | options
-    if not isinstance(options.get("method"), fb.Stepping):
+    if not any(isinstance(e, fb.Contact) for e in m.elements()):  # impulse time stepping has other options
         chosen = {"max_steps": MAX_STEPS, "specialize": False} | chosen
     try:
         run = m.simulate(t_end, **in_units(chosen, s))

@@ -284,7 +284,7 @@ def wrench_power(F, M, force, torque):
 @formula
 def rest_rate(S, W, m):
     """Rate of quantity m up to which sliding counts as rest."""
-    return REST_SPEED * characteristic_rate(S, W, m)
+    return REST_SPEED * characteristic_rate(S, W, m).real
 
 
 @formula
