@@ -1,7 +1,11 @@
 """Mechanisms in other units of length, mass and time, by powers of two: every number of the result is the scaled one.
 
 Usage: ``python benchmarks/scales.py [--seeds N] [--only TEXT ...] [--all-differences]``. Without options all examples
-and 200 random mechanisms in all six scales.
+and 200 random mechanisms in all six scales. What may differ, and why, is listed in `EXEMPT`.
+
+Where libraries may round otherwise in other units: ``pow`` of the C library, and LAPACK where a matrix mixes units (of
+motions, none does). Code made for one mechanism is not compared: whether it is used depends on the time that its
+compilation takes.
 """
 
 from __future__ import annotations
@@ -18,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
 from fuzzing import content, scenes, verdicts
@@ -29,6 +33,7 @@ import flyball as fb
 from flyball.simulation.integration_options import BAUMGARTE_RATE
 
 UNDERFLOW = 1e-290  # smaller numbers are equal: near the smallest ones that there are, digits are lost
+ROOT = Path(__file__).resolve().parents[1]
 SCALES = {
     "mass up": Scale(mass=2.0**20), "mass down": Scale(mass=2.0**-20),
     "time up": Scale(time=2.0**10), "time down": Scale(time=2.0**-10),
@@ -53,13 +58,41 @@ def cases(seeds: int) -> Iterator[tuple[str, Callable[[], Made]]]:
 
 def _example(path: Path) -> Made:
     m = fb.load(path) if path.suffix == ".toml" else runpy.run_path(str(path))["mechanism"]()
-    return m, SPAN, {}
+    # steps by impulses have a width and a tolerance in units: they are given, so that they can be converted
+    contact = any(isinstance(e, fb.Contact) for e in m.elements())
+    return m, SPAN, {"method": fb.Stepping(step=0.005)} if contact else {}
 
 
 def _random(family: str, seed: int) -> Made:
     case = verdicts.made(family, seed)
     dropped = ("outputs", "max_steps")
     return case.mechanism, case.t_end, {k: v for k, v in case.options.items() if k not in dropped}
+
+
+NOT_CONVERTED = {
+    **dict.fromkeys(("cam_follower.toml", "gear_backlash.toml"), "play with weights"),
+    **dict.fromkeys(("clock_escapement.toml", "geneva_drive.toml", "safety_brake.toml"), "events set parameters"),
+    **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "wrecking_ball.py"), "sets of bodies"),
+    "planetary.py": "a sensor of the mean of two rates",
+}
+"""Examples that `fuzzing.scaling` cannot write in other units."""
+EXEMPT = {
+    "shaken": "elastic ropes: places within a step at which both the force and the gap of a rope are guards",
+    **dict.fromkeys(
+        (
+            *scenes.SCENES, "conveyor.toml", "gripper.py", "labyrinth.py", "newtons_cradle.py", "rocking_block.toml",
+            "tippe_top.py",
+        ),
+        "steps by impulses: 1e-6 m/s below which nothing bounces, 1e-9 m of lookahead at stops, pow() of overlaps",
+    ),
+}  # fmt: skip
+"""What may differ beyond mass (ropes: by mass and time), by example or family, and why."""
+
+
+def is_exempt(name: str, scale: str) -> bool:
+    """Whether a case may differ in that scale."""
+    known = name if name in EXEMPT else name.partition(" ")[0]
+    return known in EXEMPT and (known == "shaken" or not scale.startswith("mass"))
 
 
 def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
@@ -87,7 +120,7 @@ def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) ->
     try:
         run = m.simulate(t_end, **in_units(chosen, s))
     except fb.FlyballError as error:
-        return {"error": type(error).__name__, "message": str(error)}
+        return {"error": type(error).__name__}
     out: dict[str, Any] = {"t": run.t / s.time}
     out["events"] = [f"{e.name} {e.kind}" for e in run.events]
     out["event times"] = np.array([e.t for e in run.events]) / s.time
@@ -108,8 +141,6 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
     out = [f"{k} is in one result only" for k in one.keys() ^ other.keys()]
     for k in one.keys() & other.keys():
         a, b = one[k], other[k]
-        if k == "message":
-            continue
         if not isinstance(a, np.ndarray):
             out += [f"{k}: {a!r:.60} and {b!r:.60}"] if a != b else []
         elif a.shape != b.shape:
@@ -134,7 +165,6 @@ def compared(made: Made, names: list[str]) -> Iterator[tuple[str, list[str] | st
             yield name, str(why)
             continue
         own = own or answers(scaled(m, Scale()), t_end, options, Scale())
-        if "error" in own and os.environ.get("DBG"): print(own["error"], own["message"][:150])
         yield name, differences(own, answers(other, t_end * s.time, options, s))
 
 
@@ -158,10 +188,12 @@ def main() -> None:
                 continue
             total[f"{scale}: {'differs' if found else 'equal'}"] += 1
             if found:
+                total["failed"] += not is_exempt(name, scale)
                 what = found if asked.all_differences else sorted(found)[:2]
                 print(f"{name:30} {scale:12} {len(found)}: " + "; ".join(what), flush=True)
     for k, n in sorted(total.items()):
         print(f"{k}: {n}")
+    sys.exit(total["failed"] > 0)
 
 
 if __name__ == "__main__":
