@@ -300,7 +300,7 @@ class MotionMethods(Model):
             Tolerance of the error of a step relative to the state; 1e-13 at least, 0.1 at most.
         atol : float [1], optional
             Tolerance of the error of a step where the state is small: relative to the mechanism's length or to a
-            radian, of velocities times its characteristic rate. If not given: ``rtol`` / 1000, at least 1e-14.
+            radian, of velocities times its characteristic rate. If not given: ``rtol`` / 100, at least 1e-14.
         max_step : float or str [s]
             Longest step. Changes of a law that last less than 1/20 000 of the time span can be missed: then limit the
             step.

@@ -35,7 +35,7 @@ DOUBLE = np.dtype(float).itemsize
 DEFAULT_MEMORY = 2**36  # [bytes], where the operating system does not report the memory
 BAUMGARTE_RATE = 10.0  # default rate of Baumgarte's method [1/s]
 FINEST_RTOL = 1e-13  # smallest relative tolerance; rounding is larger than smaller ones
-ATOL_PER_RTOL = 1e-3  # default atol relative to rtol
+ATOL_PER_RTOL = 1e-2  # default atol relative to rtol
 COARSEST_RTOL = 0.1  # largest relative tolerance with a meaningful result
 LEAST_ATOL = 1e-14  # smallest default atol
 
