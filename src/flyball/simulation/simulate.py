@@ -56,7 +56,7 @@ from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, St
 
 # tolerances of the stages on the constraints, as parts of the tolerance of positions; and the largest, relative to the
 # mechanism's length and speed
-STAGE_POSITIONS, STAGE_VELOCITIES = 1e-2, 1e-2
+STAGE_POSITIONS, STAGE_VELOCITIES = 1e-2, 5e-2
 COARSEST_POSITIONS, COARSEST_VELOCITIES = 1e-6, 1e-5
 TIGHT_TOLERANCE = 1e-8  # relative tolerances below this tighten the constraint tolerance of the stages quadratically
 UNSUPPORTED_BY_GENERATED = {
