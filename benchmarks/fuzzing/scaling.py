@@ -9,6 +9,7 @@ from typing import Any
 
 import flyball as fb
 from flyball.model.element import LawOf, Unit, fields_with
+from flyball.model.expressions import number
 
 BASE = {
     "m": (1, 0, 0), "kg": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2), "J": (2, 1, -2), "Pa": (-1, 1, -2),
@@ -116,10 +117,10 @@ def written(law: Any) -> tuple[tuple[str, ...], str]:
 
 def scaled(m: fb.Mechanism, s: Scale) -> fb.Mechanism:
     """The same mechanism as it is written in other units."""
-    out = fb.Mechanism(m.name, planar=m.planar, gravity=times(tuple(m.gravity), s.of("m/s^2")))
-    if m.parameters:
-        raise Unsupported("parameters have no unit")
-    known = {"t": f"(t/{s.time!r})"}
+    env = m.environment()
+    gravity = tuple(number(x, env, "m/s^2", "gravity") for x in m.gravity)
+    out = fb.Mechanism(m.name, planar=m.planar, gravity=times(gravity, s.of("m/s^2")))
+    known = {k: f"({v!r})" for k, v in env.items()} | {"t": f"(t/{s.time!r})"}
     for e in m.sensors:
         if isinstance(e, fb.Sensor):
             known[e.name] = f"({e.name}/{_of_curve(m, e.of, s)!r})"
@@ -153,8 +154,19 @@ def fields(e: Any) -> dict[str, Any]:
     return {f.name: getattr(e, f.name) for f in dataclasses.fields(e) if getattr(e, f.name) is not f.default}
 
 
+def _resolved(value: Any, env: dict[str, float], dimension: str | None) -> Any:
+    """A number, or nested tuples of them, without parameters and units."""
+    if isinstance(value, tuple | list):
+        return tuple(_resolved(v, env, dimension) for v in value)
+    return number(value, env, dimension, "a number") if isinstance(value, str) else value
+
+
 def _scaled(m: fb.Mechanism, e: Any, s: Scale, laws: Laws) -> Any:
     own = fields(e)
+    env = m.environment()
+    for k, unit in fields_with(type(e), Unit).items():
+        if k in own and k not in fields_with(type(e), LawOf):
+            own[k] = _resolved(own[k], env, unit.dimension)
     for k, unit in fields_with(type(e), Unit).items():
         if k in own and unit.dimension is not None and k not in ("orientation", "inertia_axes"):
             own[k] = times(own[k], s.of(unit.dimension))
@@ -227,7 +239,7 @@ def _initial(m: fb.Mechanism, e: Any, own: dict, s: Scale, laws: Laws) -> None:
     x = s.coordinate(e.name)
     for k, factor in (("value", x), ("rate", x / s.time)):
         if k in own:
-            own[k] = times(own[k], factor)
+            own[k] = times(_resolved(own[k], m.environment(), None), factor)
 
 
 def _coupler(m: fb.Mechanism, e: Any, own: dict, s: Scale, laws: Laws) -> None:

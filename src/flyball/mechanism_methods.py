@@ -298,9 +298,9 @@ class MotionMethods(Model):
             the method, from what time, and why. Or the name of a Runge-Kutta method defined by `elements.runge_kutta`.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least, 0.1 at most.
-        atol : float [m, rad, m/s, rad/s], optional
-            Tolerance of the error of a step where the state is small. If not given: ``rtol`` / 100, for mechanisms
-            smaller than a metre times their length [m]; never less than rounding.
+        atol : float [1], optional
+            Tolerance of the error of a step where the state is small: relative to the mechanism's length or to a
+            radian, of velocities times its characteristic rate. If not given: ``rtol`` / 100, at least 1e-14.
         max_step : float or str [s]
             Longest step. Changes of a law that last less than 1/20 000 of the time span can be missed: then limit the
             step.
@@ -430,7 +430,7 @@ class MotionMethods(Model):
             Step size of ``radau`` (chosen automatically if not given) and of the other such methods (required).
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
-        atol : float [m, rad, m/s, rad/s], optional
+        atol : float [1], optional
             Tolerance of the error of a step where the state is small; as for `simulate`.
         max_step : float or str [s]
             Longest step.
@@ -866,7 +866,7 @@ class DesignMethods(Model):
             For modes: about the static equilibrium; else about the assembled position.
         rtol : float [1], optional
             Tolerance of the error of a step of a motion relative to the state, 1e-9 if not given.
-        atol : float [m, rad, m/s, rad/s], optional
+        atol : float [1], optional
             Tolerance of the error of a step of a motion where the state is small, 1e-11 if not given. Both tolerances
             apply to the motion and to its change for a relative parameter change of 1.
         coordinates : {"auto", "absolute", "joint"}
@@ -943,7 +943,7 @@ class DesignMethods(Model):
             For modes: about the static equilibrium; else about the assembled position.
         rtol : float [1], optional
             As for `sensitivity`.
-        atol : float [m, rad, m/s, rad/s], optional
+        atol : float [1], optional
             As for `sensitivity`.
         coordinates : {"auto", "absolute", "joint"}
             As for `sensitivity`.
@@ -1058,7 +1058,7 @@ class DesignMethods(Model):
             As for `simulate`.
         rtol : float [1]
             As for `simulate`.
-        atol : float [m, rad, m/s, rad/s], optional
+        atol : float [1], optional
             As for `simulate`.
         max_step : float or str [s]
             As for `simulate`.

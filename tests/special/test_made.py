@@ -99,7 +99,8 @@ def equal(x, tables, ours):
     terms = (
         ours[2].G[: S.row_start[len(S.rows.law)]] * v[S.column[: S.row_start[len(S.rows.law)]]]
     )  # of G v, by whose size it drifts
-    assert ours[2].flat[TERMS] == pytest.approx(np.abs(terms).max(initial=0.0), rel=1e-12)
+    levers = np.repeat(S.row_levers, np.diff(S.row_start[: len(S.rows.law) + 1]))  # compared as speeds
+    assert ours[2].flat[TERMS] == pytest.approx(np.abs(terms * levers).max(initial=0.0), rel=1e-12)
 
 
 def same(model, coordinates, parameters=None, of=None):

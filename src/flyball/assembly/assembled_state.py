@@ -59,7 +59,7 @@ def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
     gaps: dict[str, tuple[float, float]] = {}
     for element, rows in c.structure.slices.items():
         part, metric = g[rows], c.metric[rows]
-        if len(part) and not np.abs(part / np.where(metric, length, 1.0)).max() < NEGLIGIBLE_GAP:
+        if len(part) and not np.abs(part / c.row_units[rows]).max() < NEGLIGIBLE_GAP:
             gaps[element] = float(np.linalg.norm(part[metric])), float(np.linalg.norm(part[~metric]))
     worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / length, gaps[k][1]))
     shown = "; ".join(f"{k} is {_gap_text(*gaps[k], length)} from closed" for k in worst[:MAX_LISTED])

@@ -28,7 +28,7 @@ from ..tables.forest import tree_joint_steps
 from ..tables.law_inputs import initial_controller_states
 from ..tables.reference_configuration import BodyState, positions
 from ..tables.structure import Choices, structure
-from ..tables.structure_definition import Structure, velocity_names
+from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, Work, assign
 from ..tables.values import Values, values
 
@@ -129,16 +129,21 @@ class CompiledMechanism:
     @property
     def sizes(self) -> np.ndarray:
         """Reference length along every velocity: the mechanism's length [m], or a radian, (nv,)."""
-        return np.array([self.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.structure)])
+        return self.values.system.velocity_units.real.copy()
 
     @cached_property
     def metric(self) -> np.ndarray:
-        """Whether the value of a row is a length [m]; else it is an angle or a cosine, (nr,)."""
+        """Whether the value of a row is a length [m] or contains one; else it is an angle or a cosine, (nr,)."""
         out = np.zeros(len(self.structure.rows), bool)
         for t in self.structure.terms:
             if not t.measured:
-                out[t.row] = t.formula.measure == "m"
+                out[t.row] |= t.formula.measure == "m"
         return out
+
+    @cached_property
+    def row_units(self) -> np.ndarray:
+        """Unit of the value of every row: the mechanism's length or a radian, by the largest factor of its terms."""
+        return self.values.length / self.values.system.row_levers.real
 
     @cached_property
     def has_curves(self) -> bool:

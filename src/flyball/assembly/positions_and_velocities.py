@@ -245,16 +245,9 @@ def largest_residual(
     g = np.abs(c.work.rows.value)
     if not np.isfinite(g).all():
         return np.inf
-    return float(
-        (
-            g
-            / np.where(
-                c.metric,
-                c.values.length + (position_rounding(c) if uncertainty is None else uncertainty) / CLOSED_TOLERANCE,
-                1.0,
-            )
-        ).max(initial=0.0)
-    )
+    rounding = position_rounding(c) if uncertainty is None else uncertainty
+    far = rounding / (CLOSED_TOLERANCE * c.values.length)
+    return float((g * row_scales(c) / np.where(c.metric, 1.0 + far, 1.0)).max(initial=0.0))
 
 
 def position_rounding(c: CompiledMechanism) -> float:
@@ -308,7 +301,7 @@ def row_scales(c: CompiledMechanism) -> np.ndarray:
 
     Without them the sum of squares over rows, and the threshold of singular values, would depend on the unit of length.
     """
-    return np.where(c.metric, 1.0 / c.values.length, 1.0)
+    return 1.0 / c.row_units
 
 
 def _damped_step(

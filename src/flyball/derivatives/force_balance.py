@@ -160,7 +160,7 @@ def _computed_sizes(e: EquationDerivatives) -> StateSizes:
     K, M = e.by_position[r].tocsr(), e.by_acceleration[r].diagonal()
     among = abs(K).multiply(size).multiply(size[:, None])
     inertia = float((size**2 * M).max(initial=0.0))
-    pace = float(e.state.c.values.system.scales.rate.real)
+    pace = float(e.state.c.work.options.rate)
     moved = (abs(e.by_position[s].toarray()) * size).max(axis=1, initial=0.0)  # rates by large steps of the mechanism
     between = np.abs(e.state_jacobian)
     decay = np.diag(between)

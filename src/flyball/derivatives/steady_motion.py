@@ -175,7 +175,7 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
 
 def is_still(x: MechanismState) -> bool:
     """Whether all speeds are negligible compared with the mechanism's characteristic rate or its accelerations."""
-    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.scales.rate.real)
+    scale, pace = x.c.sizes / x.c.values.length, float(x.c.work.options.rate)
     given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
     return not (np.abs(x.v) / scale).max(initial=0.0) > REST_SPEED * given
 

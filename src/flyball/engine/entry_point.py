@@ -70,6 +70,7 @@ from .kinematics import store_ground_frames
 from .motion import derivative, follow_drivers, project_and_evaluate, report_state, solve_response
 from .pulse_detection import INSPECTION_ROWS, inspect_step
 from .residual import force_slopes, residual
+from .rows import characteristic_rate_within
 from .stabilization import project_error, update_positions, update_velocities
 
 MAX_KEPT_LAYOUTS = 4  # layouts of workspaces and tables that are cached for each structure
@@ -82,6 +83,7 @@ def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Wo
         return pooled_work(structure, system, dtype).fields  # type: ignore[no-any-return]
     W = zero_work(structure, system, dtype)
     W.modes.lower[:], W.modes.upper[:] = system.switch_numbers.lower, system.switch_numbers.upper
+    W.options.rate = characteristic_rate_within(system)
     store_ground_frames(system, W)
     return W
 
@@ -98,6 +100,7 @@ def pooled_work(structure: Structure, system: System, dtype: Any) -> PooledBuffe
 
 def initialise_work(structure: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
     """Initialise a zeroed workspace, whose arrays are found by name, from the tables."""
+    array("options").rate = characteristic_rate_within(system)  # type: ignore[attr-defined]
     if len(system.switch_numbers.lower):
         array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
     if n := system.sizes.ground_frames:

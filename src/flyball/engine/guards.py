@@ -94,14 +94,14 @@ def switch_guard(S, W, t, kind, s, own):
         return way * corner_value(S, W, t, s) if W.modes.mode[s] == OFF else 1.0 - magnitude(way)
     m, k = S.switches.measured[s], S.switches.row[s]
     if kind == G_TURNS and S.switches.partner[s] < 0 and is_sliding(S, W, s):
-        return way * significant_rate(W.sensed[RATE, m], characteristic_rate(S, m))
+        return way * significant_rate(W.sensed[RATE, m], characteristic_rate(S, W, m))
     if kind >= G_CONE:
         return contact_guard(S, W, W.sensed, W.rows.multiplier, kind, s)
     force = W.rows.multiplier[k] if k >= 0 else 0.0
     limited = (kind == G_HOLDS or kind == G_OWN) and W.modes.mode[s] != OFF
     largest = friction_limit(S, W, t, s) if limited else 0.0
     numbers = (W.modes.lower[s], W.modes.upper[s], S.switch_numbers.stiffness[s], S.switch_numbers.damping[s], largest)
-    units = S.units[m], characteristic_rate(S, m)
+    units = S.units[m], characteristic_rate(S, W, m)
     mode, x, rate = W.modes.mode[s], W.sensed[VALUE, m], W.sensed[RATE, m]
     return guard(own if kind == G_OWN else kind, mode, way, x, rate, force, numbers, units)
 
@@ -111,11 +111,11 @@ def guard_rounding(S, W, t, trial, so_far, out):
     """Write the rounding error of every guard at the state last evaluated to ``out`` (ng,).
 
     ``trial`` is scratch of the shape of ``W.sensed``; ``so_far`` is the largest rate so far, whose rounding errors
-    persist.
+    persist. Multipliers are compared as forces.
     """
     fastest, strongest = largest_measured_rate(S, W), 0.0
     for k in range(S.rows.law.shape[0]):
-        strongest = max(strongest, magnitude(W.rows.multiplier[k]))
+        strongest = max(strongest, magnitude(W.rows.multiplier[k]) / S.row_levers[k])
     for g in range(S.guards.kind.shape[0]):
         kind, of = S.guards.kind[g], S.guards.of[g]
         out[g] = 0.0
@@ -125,11 +125,11 @@ def guard_rounding(S, W, t, trial, so_far, out):
         elif (
             kind == G_SLIDES or kind == G_REVERSES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0)
         ):
-            out[g] = max(
-                RELATIVE_ROUNDING * fastest, POSITION_ROUNDING * characteristic_rate(S, S.switches.measured[of])
-            )
+            m = S.switches.measured[of]
+            out[g] = max(RELATIVE_ROUNDING * fastest * S.units[m], POSITION_ROUNDING * characteristic_rate(S, W, m))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
-            out[g] = RELATIVE_ROUNDING * strongest
+            k = S.switches.row[of]
+            out[g] = RELATIVE_ROUNDING * strongest * S.row_levers[k] if k >= 0 else 0.0
         elif kind == G_LAW or kind == G_CORNER:
             at = of if kind == G_LAW else S.switches.law[of]
             most_of = (so_far, 1.0, strongest) if kind == G_LAW else (fastest, 0.0, strongest)
@@ -141,7 +141,8 @@ def law_rounding(S, W, t, at, trial, most_of):
     """Change of a law when its arguments change by their rounding errors.
 
     Each argument is varied by itself: a value that is zero by symmetry does not change if all vary together.
-    ``most_of``: the largest rate, 1 where rates are compared at least with the characteristic rate, the largest force.
+    ``most_of``: the largest rate relative to its unit, 1 where rates are compared at least with the characteristic
+    rate, the largest force.
     """
     nm, first, last = count_measured(S), loads_end(S, W), controller_column(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
@@ -154,7 +155,7 @@ def law_rounding(S, W, t, at, trial, most_of):
             continue
         x, dx = W.sensed[VALUE, m], 0.0
         if m < 2 * nm:
-            least = S.units[m] if m < nm else max(most_of[0], most_of[1] * characteristic_rate(S, m - nm))
+            least = S.units[m] if m < nm else S.units[m - nm] * max(most_of[0], most_of[1] * W.options.rate)
             dx = POSITION_ROUNDING * max(magnitude(x), least)
         elif m >= first and m < last:
             dx = RELATIVE_ROUNDING * most_of[2]
@@ -205,7 +206,7 @@ def corner_terms(S, W, t, s, fastest):
             if m < nm:
                 x = max(x, S.units[m])
             elif m < 2 * nm:
-                x = max(x, fastest, characteristic_rate(S, m - nm))
+                x = max(x, fastest * S.units[m - nm], characteristic_rate(S, W, m - nm))
             size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
     return size
 

@@ -209,7 +209,8 @@ def remove_guard_residue(S, W, K, out):
             least = HELD_RESIDUE * K.tied[i]
             if S.guards.kind[i] == G_BACK:
                 fastest = largest_measured_rate(S, W) if fastest < 0.0 else fastest
-                least = HELD_RESIDUE * max(fastest, K.tied[i])
+                unit = S.units[S.switches.measured[S.guards.of[i]]]
+                least = HELD_RESIDUE * max(fastest * unit, K.tied[i])
             out[i] -= min(max(out[i], -least), least)
 
 
@@ -220,7 +221,7 @@ def remove_rate_residue(S, W, K):
     for m in range(nm):
         if K.still[m] > 0.0:
             fastest = largest_measured_rate(S, W) if fastest < 0.0 else fastest
-            least = HELD_RESIDUE * max(fastest, K.still[m])
+            least = HELD_RESIDUE * max(fastest * S.units[m], K.still[m])
             x = W.sensed[VALUE, nm + m]
             W.sensed[VALUE, nm + m] -= min(max(x, -least), least)
 

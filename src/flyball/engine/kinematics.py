@@ -493,7 +493,8 @@ def _set_joint_velocities(x: Values, W: Any, t: TreeJoint, d: BodyState, parent:
         v[at[0]] = (columns[0] @ rel) / (columns[0] @ columns[0])
     elif at:
         rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
-        v[at] = least_squares(np.array(columns).T, rel)
+        unit = S.velocity_units[at] / x.length  # columns of one unit
+        v[at] = unit * least_squares(np.array(columns).T * unit, rel)
 
 
 def least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -39,7 +39,14 @@ from ..tables.table_definitions import (
 )
 from .element_dispatch import effort, force_kind, inputs, wrench
 from .kinematics import load_record, project_wrench
-from .rows import characteristic_speed, controller_column, count_measured, direction_column, wrench_on_second
+from .rows import (
+    characteristic_rate,
+    characteristic_speed,
+    controller_column,
+    count_measured,
+    direction_column,
+    wrench_on_second,
+)
 
 SLOW_SLIDING = 1e-10  # relative to the characteristic speed: slower sliding in space takes the direction of its switch
 ONSET_LENGTH = 2.0  # length of the stored direction at the onset of sliding in space; sliding follows it at first
@@ -72,7 +79,7 @@ def sliding_direction(S, W, sensed, s):
         return way, 0.0 * way, u * way
     side = sensed[VALUE, direction_column(S, W, other)]
     v = sensed[RATE, S.switches.measured[other]]
-    return direction_in_space(characteristic_speed(S), (way, side), (u, v))
+    return direction_in_space(characteristic_speed(S, W), (way, side), (u, v))
 
 
 @formula
@@ -160,12 +167,12 @@ def contact_guard(S, W, sensed, lam, kind, s):
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURN_COSINE * speed
     if size * size > ONSET_LENGTH:
-        pace = characteristic_speed(S)
+        pace = characteristic_speed(S, W)
         return min(turned + REVERSAL_SPEED * pace, ONSET_END * ONSET_SPEED * pace - speed)
     return turned
 
 
-REST_SPEED = 1e-9  # relative to the characteristic speed: slower counts as rest
+REST_SPEED = 1e-9  # relative to the characteristic rate of a quantity: slower counts as rest
 
 
 @formula
@@ -272,20 +279,20 @@ def wrench_power(F, M, force, torque):
 
 
 @formula
-def rest_speed(S):
-    """Speed [m/s] up to which sliding counts as rest."""
-    return REST_SPEED * characteristic_speed(S).real
+def rest_rate(S, W, m):
+    """Rate of quantity m up to which sliding counts as rest."""
+    return REST_SPEED * characteristic_rate(S, W, m).real
 
 
 @formula
 def sliding_sign(S, W, k, rate):
-    """Direction of sliding of force k: that of its switch, or else the sign of the rate."""
+    """Direction of sliding of force k along its quantity: that of its switch, or else the sign of the rate."""
     s = S.forces.switch[k]
     if s < 0:
         return sign(rate)
     told = W.sensed[VALUE, direction_column(S, W, s)]
     if told.real == BY_RATE:
-        return sign(rate) if magnitude(rate) > rest_speed(S) else 0.0 * told
+        return sign(rate) if magnitude(rate) > rest_rate(S, W, S.forces.F[k]) else 0.0 * told
     return told
 
 
@@ -425,13 +432,13 @@ def returned_loads(S, W):
 
 @formula
 def force_scale(S, W):
-    """Largest force that moves a body or would be needed to satisfy a constraint, as a scale of loads."""
+    """Largest force that moves a body or would be needed to satisfy a constraint, as a scale of loads [N]."""
     size = 1e-300
     for d in range(W.velocities.solved.shape[0]):
-        size = max(size, abs(W.velocities.applied[d]))
+        size = max(size, abs(W.velocities.applied[d]) * S.velocity_units[d] / S.scales.length)
     for k in range(S.rows.law.shape[0]):
         if W.rows.diagonal[k] > 0.0:
-            size = max(size, abs(W.rows.gamma[k]) / W.rows.diagonal[k])
+            size = max(size, abs(W.rows.gamma[k]) / (W.rows.diagonal[k] * S.row_levers[k]))
     return size
 
 

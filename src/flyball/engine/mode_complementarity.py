@@ -279,7 +279,7 @@ def store_switch_rates(S, W, y, B):
     """Store value, rate, and rounding of the rate, of the quantities of B's switches in ``now``, ``rate``, ``seen``."""
     nq, most = S.sizes.coordinates, 0.0
     for d in range(W.velocities.solved.shape[0]):
-        most = max(most, magnitude(y[nq + d]))
+        most = max(most, magnitude(y[nq + d]) / S.velocity_units[d])
     for i in range(B.which.shape[0]):
         m = S.switches.measured[B.which[i]]
         B.now[i] = B.rate[i] = B.seen[i] = 0.0
@@ -287,9 +287,9 @@ def store_switch_rates(S, W, y, B):
             B.now[i], B.rate[i] = W.sensed[VALUE, m], W.sensed[RATE, m]
             r = S.rows.law.shape[0] + m
             for e in range(S.row_start[r], S.row_start[r + 1]):
-                B.seen[i] += magnitude(W.G[e]) * (
-                    RATE_ROUNDING * magnitude(y[nq + S.column[e]]) + VELOCITY_ROUNDING * most
-                )
+                d = S.column[e]
+                rounding = RATE_ROUNDING * magnitude(y[nq + d]) + VELOCITY_ROUNDING * most * S.velocity_units[d]
+                B.seen[i] += magnitude(W.G[e]) * rounding
 
 
 @kernel

@@ -188,7 +188,7 @@ def prescribed_deviation(S, W, t, q, v):
             if S.tree.joint[b] == REVOLUTE:  # whole turns are those of the law
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
-            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.scales.rate + magnitude(f1))
+            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * W.options.rate + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
 
@@ -403,7 +403,7 @@ def write_row(t, y, out, S, W):
     nv = W.velocities.solved.shape[0]
     ny = y.shape[0]
     if S.rows.law.shape[0] > 0:
-        W.options.position_violation = max(W.options.position_violation, position_violation(W, W.rows.scratch_2))
+        W.options.position_violation = max(W.options.position_violation, position_violation(S, W, W.rows.scratch_2))
         W.options.velocity_violation = max(
             W.options.velocity_violation, velocity_violation(S, W, y[nq : nq + nv], W.rows.scratch_2)[0]
         )

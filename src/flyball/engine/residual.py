@@ -154,8 +154,8 @@ def effort_slopes(S, W, t, k, out):
     """Stiffness and damping of force k along a measured quantity."""
     m = S.forces.F[k]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
-    d = DIFFERENCE_STEP * min(1.0, S.scales.length)
-    e = d + DIFFERENCE_STEP * abs(rate)
+    d = DIFFERENCE_STEP * S.units[m]
+    e = d * W.options.rate + DIFFERENCE_STEP * abs(rate)
     pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     for j in range(5):
         dx = d if j == 1 else -d if j == 2 else 0.0
@@ -175,13 +175,14 @@ def wrench_slopes(S, W, t, k, out):
     par = force_row(S.force_parameters, k)
     F = load_record(W.FK, S.forces.F[k])
     p, R, w, v, alpha, a = load_record(W.FK, S.forces.M[k])
-    d = DIFFERENCE_STEP * min(1.0, S.scales.length)
-    e = d + DIFFERENCE_STEP * norm(sub(v, F[3]))
+    speed = S.scales.length * W.options.rate + norm(sub(v, F[3]))
     n = int(out[k, DIRECTIONS])
     for j in range(4 * n):
         i = j // 4
         up = 1.0 if j % 2 == 0 else -1.0
         axis = probe_direction(F, p, n, i)
+        d = DIFFERENCE_STEP * (S.scales.length if i < 3 else 1.0)
+        e = DIFFERENCE_STEP * (speed if i < 3 else speed / S.scales.length)
         moved, moving = (up * d, 0.0) if j % 4 < 2 else (0.0, up * e)
         if i < 3:
             M = (add(p, scale(moved, axis)), R, w, add(v, scale(moving, axis)), alpha, a)

@@ -20,7 +20,7 @@ from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub
-from ..tables.table_definitions import BIAS, RATE, VALUE
+from ..tables.table_definitions import BIAS, RATE, VALUE, System
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7
@@ -323,24 +323,32 @@ def row_times(S, W, k, x):
     return s
 
 
+DEFAULT_RATE = 1.0  # [1/s]: at an instant, where there is neither gravity nor any speed
+
+
+def characteristic_rate_within(S: System, span: float = 0.0) -> float:
+    """Characteristic rate [1/s] for a motion of that duration, which sets it where nothing else does."""
+    return float(S.scales.rate.real) or (1.0 / span if span > 0.0 else DEFAULT_RATE)
+
+
 @formula
-def characteristic_speed(S):
+def characteristic_speed(S, W):
     """Characteristic speed of the mechanism: its length times its characteristic rate [m/s]."""
-    return S.scales.length * S.scales.rate
+    return S.scales.length * W.options.rate
 
 
 @formula
-def characteristic_rate(S, m):
+def characteristic_rate(S, W, m):
     """Characteristic rate of quantity m, whose unit may be a radian."""
-    return S.units[m] * S.scales.rate
+    return S.units[m] * W.options.rate
 
 
 @formula
 def largest_measured_rate(S, W):
-    """Largest measured rate."""
+    """Largest measured rate, relative to the unit of its quantity."""
     fastest = 0.0
     for m in range(count_measured(S)):
-        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+        fastest = max(fastest, magnitude(W.sensed[RATE, m]) / S.units[m])
     return fastest
 
 

@@ -18,7 +18,7 @@ conditioned.
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from ..math.scalar import choose, larger, magnitude, minimum
+from ..math.scalar import choose, larger, magnitude
 from ..math.vec import load9, mv
 from ..numerics.sparse_factorisation import ldl_factor, ldl_solve
 from ..tables.table_definitions import (
@@ -146,12 +146,11 @@ def factor_schur(S, W):
 def factor_coupled(S, W):
     """Factor [M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M in place of M in delta.
 
-    For delta, a lever (1 or the mechanism's length) is added to the entries of G: the size of a row along which the
-    forest cannot move, now or ever, must not vanish with its entries.
+    For delta, the ratio of both units (the mechanism's length or a radian) is added to the entries of G: the size of a
+    row along which the forest cannot move, now or ever, must not vanish with its entries.
     """
     nv = W.velocities.solved.shape[0]
     per = W.velocities.scratch_1
-    lever = minimum(1.0, S.scales.length) ** 2
     mass_entries(S, W)
     for e in range(S.mass_entries.row.shape[0]):
         d = S.mass_entries.row[e]
@@ -163,10 +162,12 @@ def factor_coupled(S, W):
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
         s = 0.0 * W.rows.diagonal[k]
+        unit = S.scales.length / S.row_levers[k]
         for e in range(S.row_start[k], S.row_start[k + 1]):
             W.A[S.pairs.place[e]] = W.G[e]
             if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities do not count
-                s += (W.G[e] * W.G[e] + lever) * per[S.column[e]]
+                ratio = unit / S.velocity_units[S.column[e]]
+                s += (W.G[e] * W.G[e] + ratio * ratio) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
         W.rows.diagonal[k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.scales.regularization * s
@@ -329,7 +330,7 @@ def residual_schur(S, W, gamma, x, rhs, semidefinite):
 def row_residual(S, W, gamma, x):
     """R = gamma - G x into `W.rows.scratch_1`.
 
-    Returns its largest entry relative to its terms, and that entry.
+    Returns its largest entry relative to its terms, and that entry, as a length.
     """
     off = 0.0
     size = 1e-300
@@ -341,8 +342,8 @@ def row_residual(S, W, gamma, x):
             s -= p
             a += magnitude(p)
         W.rows.scratch_1[k] = s
-        off = larger(off, magnitude(s))
-        size = larger(size, a)
+        off = larger(off, magnitude(s) * S.row_levers[k])
+        size = larger(size, a * S.row_levers[k])
     return off / size, off
 
 
@@ -350,18 +351,19 @@ def row_residual(S, W, gamma, x):
 def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Residuals of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
-    Returns the largest entry of either relative to its terms, and that of gamma - G x. The residuals of prescribed
-    velocities are the efforts of their drivers: they go to `W.velocities.effort`.
+    Returns the largest entry of either relative to its terms, and that of gamma - G x as a length. Forces and torques
+    are compared by their work along the mechanism's length and a radian. The residuals of prescribed velocities are the
+    efforts of their drivers: they go to `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
-        size = larger(size, magnitude(rhs[d]))
+        size = larger(size, magnitude(rhs[d]) * S.velocity_units[d])
     for e in range(S.mass_entries.row.shape[0]):
         i, j = S.mass_entries.row[e], S.mass_entries.column[e]
         p = W.M[e] * x[j]
         rhs[i] -= p
-        size = larger(size, magnitude(p))
+        size = larger(size, magnitude(p) * S.velocity_units[i])
         if i != j:
             rhs[j] -= W.M[e] * x[i]
     wide = 1e-300
@@ -373,13 +375,13 @@ def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
             d = S.column[e]
             p = W.G[e] * lam[k]
             rhs[d] += p
-            size = larger(size, magnitude(p))
+            size = larger(size, magnitude(p) * S.velocity_units[d])
             p = W.G[e] * x[d]
             s -= p
             a += magnitude(p)
         W.rows.scratch_1[k] = s
-        off = larger(off, magnitude(s))
-        wide = larger(wide, a)
+        off = larger(off, magnitude(s) * S.row_levers[k])
+        wide = larger(wide, a * S.row_levers[k])
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
@@ -387,7 +389,7 @@ def residual_coupled(S, W, f, gamma, x, lam, rhs, loaded):
             rhs[d] = 0.0
     worst = 0.0
     for d in range(x.shape[0]):
-        worst = larger(worst, magnitude(rhs[d]))
+        worst = larger(worst, magnitude(rhs[d]) * S.velocity_units[d])
     return larger(worst / size, off / wide), off
 
 

@@ -46,15 +46,14 @@ NOT_CLOSED = 2  # a status
 FACTOR_OLD, FACTOR_NEAR, FACTOR_CURRENT = range(3)
 MAX_PASSES = 16
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are not corrected
-# [m] or, if less, the mechanism's length: times the characteristic rate, it scales violations of slow velocities
-METRE = 1.0
-CLOSED_POSITIONS = 1e-9  # a projection that stalls above this has failed, unless rounding is larger
+# relative to the mechanism's length: a projection that stalls above this has failed, unless rounding is larger
+CLOSED_POSITIONS = 1e-9
 LAST_DIGIT = 1e-15  # times the distance from the origin: rounding of a violation
 # a Newton step that reduces the violation to no less than this fraction is followed by a new factorisation
 SLOW_CONVERGENCE = 0.1
 # times the tolerance of the solve: a residual above this after refinement requires a new factorisation
 STALE_RESIDUAL = 10.0
-HOPELESS_VIOLATION = 1e3  # a state with a larger violation is given up at once
+HOPELESS_VIOLATION = 1e3  # relative to the mechanism's length: a state with a larger violation is given up at once
 
 
 @formula
@@ -79,13 +78,13 @@ def update_velocities(S, W, t, v, z):
 
 
 @formula
-def position_violation(W, out):
-    """Largest |g|; its row goes to `W.counts.guilty_row`, and -g to ``out``."""
+def position_violation(S, W, out):
+    """Largest |g| as a length; its row goes to `W.counts.guilty_row`, and -g to ``out``."""
     worst = 0.0
     for k in range(out.shape[0]):
         g = W.rows.value[k]
         out[k] = -g
-        size = magnitude(g)
+        size = magnitude(g) * S.row_levers[k]
         if not size <= worst:
             worst = size
             W.counts.guilty_row = k
@@ -112,7 +111,7 @@ def position_rounding(S, W, q):
 
 @formula
 def velocity_violation(S, W, v, out):
-    """Largest |G v - nu| and the size of its largest term; nu - G v goes to ``out``."""
+    """Largest |G v - nu| and the size of its largest term, as speeds; nu - G v goes to ``out``."""
     if W.made[DRIFT] != 0:
         worst = call_generated(W.made[DRIFT], S, W, 0.0, v, out, v, out)
         return worst, W.flat[TERMS]
@@ -120,12 +119,14 @@ def velocity_violation(S, W, v, out):
     size = 0.0
     for k in range(out.shape[0]):
         r = W.rows.nu[k]
+        largest = 0.0
         for e in range(S.row_start[k], S.row_start[k + 1]):
             p = W.G[e] * v[S.column[e]]
             r -= p
-            size = larger(size, magnitude(p))
+            largest = larger(largest, magnitude(p))
         out[k] = r
-        worst = larger(worst, magnitude(r))
+        size = larger(size, largest * S.row_levers[k])
+        worst = larger(worst, magnitude(r) * S.row_levers[k])
     return worst, size
 
 
@@ -177,16 +178,17 @@ def project_positions(S, W, t, q, z, tol_g):
     none = W.velocities.applied
     step = W.velocities.scratch_3
     r = W.rows.scratch_2
-    worst = position_violation(W, r)
+    worst = position_violation(S, W, r)
     found = worst
+    closed = CLOSED_POSITIONS * S.scales.length
     last = 1e300
     factored = FACTOR_OLD
     for _ in range(MAX_PASSES):
         if worst <= tol_g:
             break
-        if worst > 0.7 * last and (worst <= CLOSED_POSITIONS or worst <= position_rounding(S, W, q)):
+        if worst > 0.7 * last and (worst <= closed or worst <= position_rounding(S, W, q)):
             break
-        if not worst <= HOPELESS_VIOLATION:
+        if not worst <= HOPELESS_VIOLATION * S.scales.length:
             return NOT_CLOSED, found, FACTOR_OLD
         if factored == FACTOR_OLD or worst > SLOW_CONVERGENCE * last:
             if factor(S, W) != 0:
@@ -203,9 +205,9 @@ def project_positions(S, W, t, q, z, tol_g):
         factored = FACTOR_NEAR
         retract(S, q, step)
         update_positions(S, W, t, q, z)
-        worst = position_violation(W, r)
+        worst = position_violation(S, W, r)
         W.counts.projections += 1
-    if not worst <= CLOSED_POSITIONS and not worst <= tol_g and not worst <= position_rounding(S, W, q):
+    if not worst <= closed and not worst <= tol_g and not worst <= position_rounding(S, W, q):
         return NOT_CLOSED, found, FACTOR_OLD
     return 0, found, factored
 
@@ -220,7 +222,7 @@ def project_velocities(S, W, v, tol_v, factored):
     step = W.velocities.scratch_3
     r = W.rows.scratch_2
     worst, size = velocity_violation(S, W, v, r)
-    if worst > tol_v * (min(METRE, S.scales.length) * S.scales.rate + size):
+    if worst > tol_v * (characteristic_speed(S, W) + size):
         if factored == FACTOR_NEAR:
             reuse_factor(S, W)
         if (
@@ -234,7 +236,7 @@ def project_velocities(S, W, v, tol_v, factored):
             solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    return 0, worst / (characteristic_speed(S) + size), factored
+    return 0, worst / (characteristic_speed(S, W) + size), factored
 
 
 @formula

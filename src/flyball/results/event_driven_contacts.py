@@ -9,7 +9,7 @@ import numpy as np
 
 from ..constraints.switches.guard_kinds import OFF
 from ..engine.loads import direction_in_space
-from ..engine.rows import characteristic_speed
+from ..engine.rows import characteristic_rate_within
 from ..math.vec import dot
 from ..model.body import GROUND
 from ..model.contact_point import Touch
@@ -85,7 +85,8 @@ class ContactHistory:
         """Sliding friction on the second side [N], (n, 3)."""
         d = self._result.phases.sigma[self._switches[1:]] + 0.0 * self.slip  # type: ignore[union-attr]
         if len(d) > 1:
-            pace = float(characteristic_speed(self._result.values.system).real)
+            x, t = self._result.values, self._result.t
+            pace = x.length * characteristic_rate_within(x.system, float(t[-1] - t[0]))
             for i in np.flatnonzero(self.slides).tolist():
                 d[:, i] = direction_in_space(pace, tuple(d[:, i].tolist()), tuple(self.slip[:, i].tolist()))[:2]
         size = -self.element.friction[1] * self.pressure * self.slides

@@ -250,6 +250,10 @@ class VariationalIntegration:
         at, more = self.nq + self.nv, 2 * self.nv * n
         y = self.start.y
         Y[0, :at], Y[0, at : at + more], Y[0, self._places(0)] = y[:at], changes.ravel(), y[at:]
+        unit, v_unit = own.y[ex.UNIT], self.c.values.system.velocity_units
+        rates = np.concatenate([v_unit, unit[self.nq : at]])
+        Y[ex.UNIT] = 1.0
+        Y[ex.UNIT, :at], Y[ex.UNIT, at : at + more] = unit[:at], np.tile(rates, n)
         accounts = [self._places(k)[own.integrals - at] for k in range(n + 1)]
         count = own.count.copy()
         count.controlled = at + more + (n + 1) * self.controls

@@ -114,19 +114,6 @@ NOTABLE = 10.0  # rounding error of a step, in tolerances, from which on it is r
 RECENT_SHARE = 1e-3  # part of the time span before a stop within which rounding counts as its cause
 
 
-def rounding_is_notable(worst: np.ndarray, far: np.ndarray, atol: np.ndarray, relative: np.ndarray) -> np.ndarray:
-    """Return in which of several motions `rounding_error_remark` or `origin_distance_remark` is not empty.
-
-    Parameters
-    ----------
-    worst, far : (n,) ndarray
-        ``largest_error`` of the integrator state; distance of the farthest frame from the origin [m].
-    atol, relative : (n,) ndarray
-        Tolerance of positions [m]: the absolute one, and rtol times the mechanism's length.
-    """
-    return (worst > NOTABLE) | (np.spacing(far) > atol + relative)
-
-
 def rounding_error_remark(clock: ex.StepState) -> str:
     """Return a remark on the largest accepted step error caused by rounding; empty if it is not notable."""
     size = clock.real.largest_error
@@ -144,7 +131,7 @@ def origin_distance_remark(a: Assembly, clock: ex.StepState) -> str:
     length = a.compiled.values.length
     far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
     digit = math.ulp(far)
-    if not digit > clock.real.atol + clock.real.rtol * length:
+    if not digit > (clock.real.atol + clock.real.rtol) * length:
         return ""
     return (
         f"rounding is the limit: positions {far:.3g} m from the origin are known to {digit:.1g} m, which is more than "
@@ -182,7 +169,7 @@ def acceleration_residual(
     turning = np.zeros(n)
     np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
     asked = times(abs(G), np.abs(_unconstrained_accelerations(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
-    metre = np.where(c.metric, c.values.length, 1.0)
+    metre = c.row_units
     size = asked + times(abs(G), np.abs(x))
     return np.abs(times(G, x) - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
 
@@ -588,7 +575,8 @@ def _fastest_component(clock: ex.StepState) -> int:
     """Return the state component whose derivative changed most within the last step, relative to its tolerance."""
     n = clock.count.controlled
     with np.errstate(all="ignore"):
-        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real.atol + clock.real.rtol * np.abs(clock.y[0, :n]))
+        allowed = clock.real.atol * clock.y[ex.UNIT, :n] + clock.real.rtol * np.abs(clock.y[0, :n])
+        change = np.ptp(clock.K[:, :n], axis=0) / allowed
     return int(np.argmax(np.nan_to_num(change)))
 
 

@@ -37,7 +37,7 @@ BAUMGARTE_RATE = 10.0  # default rate of Baumgarte's method [1/s]
 FINEST_RTOL = 1e-13  # smallest relative tolerance; rounding is larger than smaller ones
 ATOL_PER_RTOL = 1e-2  # default atol relative to rtol
 COARSEST_RTOL = 0.1  # largest relative tolerance with a meaningful result
-LEAST_ATOL = 1e-14  # smallest default atol, relative to the mechanism's length [m] or to a radian
+LEAST_ATOL = 1e-14  # smallest default atol
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,23 +111,14 @@ class Integration(Options):
                 raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it has "
                                  "no effect")  # fmt: skip
 
-    def sized(self, length: float) -> Self:
-        """Return the options with `tolerance` as ``atol``."""
-        return self.known(atol=self.tolerance(length))
-
-    def tolerance(self, length: float) -> float:
-        """Return the given ``atol``, or the default for a mechanism of that length [m]."""
-        return default_atol(self.rtol, length) if self.atol is None else self.atol
+    def with_tolerance(self) -> Self:
+        """Return the options with the default ``atol`` if none is given."""
+        return self if self.atol is not None else self.known(atol=max(ATOL_PER_RTOL * self.rtol, LEAST_ATOL))
 
     def choices(self) -> dict[str, Any]:
         """Return the integration options by name, without the other arguments."""
         own = vars(self)
         return {name: own[name] for name in names_of(Integration)}
-
-
-def default_atol(rtol: float, length: float) -> float:
-    """Return the default absolute tolerance for a mechanism of that length [m]."""
-    return max(ATOL_PER_RTOL * rtol, LEAST_ATOL) * min(1.0, length)
 
 
 def default_integration(coordinates: str, rtol: float, atol: float, max_steps: int = MOST_STEPS) -> Integration:

@@ -14,6 +14,7 @@ from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.entry_point import FOLLOW, INTEGRATE
 from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
+from ..engine.rows import characteristic_rate_within
 from ..engine.stabilization import TIGHT_G, TIGHT_V
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
 from ..laws.breakpoints import NO_BREAKPOINTS
@@ -24,7 +25,7 @@ from ..numerics.integrators.butcher_tableaux import Tableau, tableau
 from ..progress import ReportProgress, progress_bar
 from ..results.health import changed_velocities, velocity_not_allowed
 from ..results.result import Result
-from ..tables.table_definitions import System
+from ..tables.table_definitions import FREE, SPHERICAL, System
 from . import initial_state
 from .events.context import EventContext
 from .events.event_loop import integrate_events
@@ -52,6 +53,10 @@ from .prescribed_motion import at_outputs, deferred_works, leaves_no_freedom, re
 from .sampling_instants import refuse_too_often
 from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, StiffnessMonitor
 
+# tolerances of the stages on the constraints, as parts of the tolerance of positions; and the largest, relative to the
+# mechanism's length and speed
+STAGE_POSITIONS, STAGE_VELOCITIES = 1e-2, 5e-2
+COARSEST_POSITIONS, COARSEST_VELOCITIES = 1e-6, 1e-5
 TIGHT_TOLERANCE = 1e-8  # relative tolerances below this tighten the constraint tolerance of the stages quadratically
 UNSUPPORTED_BY_GENERATED = {
     "partitioning": (
@@ -169,7 +174,7 @@ def integrate_motion(
         If the integration fails; its ``result`` holds the motion up to the failure.
     """
     refuse_out_of_table(start.base, float(t_end))
-    o = o.sized(start.base.compiled.values.length)
+    o = o.with_tolerance()
     if o.stabilization == "partitioning":
         initial_state.choose_independent(start.base.compiled.structure.model, start)
     c, engine = start.assembly.compiled, start.engine or CodeSelection(start.assembly.compiled, False)
@@ -271,29 +276,37 @@ def clock_for(
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(explicit_substitute(o.method)).c) + 1, len(y)))
     clock = ex.StepState(real, count, times, Y, K, np.array(works, np.int64), seen)
-    set_scales(clock, start.base, a.compiled, o.tolerance(a.compiled.values.length))
+    real.atol = o.with_tolerance().atol
+    set_scales(clock, start.base, a.compiled)
     return clock
 
 
-def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism, atol: float) -> None:
-    """Set the tolerances and reference scales that follow from a mechanism's length and weight."""
-    real = clock.real
-    energy = energy_scale(base, float(real.span))
-    found = scales_and_tolerances(c.values.length, atol, real.rtol, energy)
-    (real.atol, real.scale, real.energy_size), (near, slow) = found
-    c.array("options").position_tolerance, c.array("options").velocity_tolerance = near, slow
+def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> None:
+    """Set the units of the state, the energy scale and the tolerances on the constraints."""
+    real, length = clock.real, c.values.length
+    real.energy_size = energy_scale(base, float(real.span))
+    rate = c.array("options").rate = characteristic_rate_within(c.values.system, float(real.span))
+    nq, nv = c.structure.nq, c.structure.nv
+    clock.y[ex.UNIT] = c.values.kept.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
+    clock.y[ex.UNIT, nq : nq + nv] *= rate
+    loose = real.atol + real.rtol
+    near = loose * min(1.0, loose / TIGHT_TOLERANCE)
+    c.array("options").position_tolerance = length * min(COARSEST_POSITIONS, max(TIGHT_G, STAGE_POSITIONS * near))
+    c.array("options").velocity_tolerance = min(COARSEST_VELOCITIES, max(TIGHT_V, STAGE_VELOCITIES * near))
 
 
-def scales_and_tolerances(
-    length: float, atol: float, rtol: float, energy: float
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return (atol, length scale, energy scale) and the tolerances of positions and velocities on the constraints."""
-    loose = atol + rtol * length
-    near = loose * min(1.0, loose / (TIGHT_TOLERANCE * length))
-    return (atol, length, energy), (
-        min(1e-6, max(TIGHT_G * length, 1e-2 * near)),
-        min(1e-5, max(TIGHT_V, 1e-1 * near)),
-    )
+def state_units(c: CompiledMechanism, width: int) -> np.ndarray:
+    """Return the unit of every component of the state.
+
+    It is the mechanism's length or a radian, the same per second for velocities, and 1 of what follows them.
+    """
+    S, nq = c.values.system, c.structure.nq
+    out = np.ones(width)
+    for kind, q, v, nv in zip(S.tree.joint, S.tree.q, S.tree.v, S.tree.nv, strict=True):
+        shifts = 3 if kind == FREE else 0 if kind == SPHERICAL else nv  # the others are quaternions
+        out[q : q + shifts] = S.velocity_units[v : v + shifts]
+    out[nq : nq + c.structure.nv] = S.velocity_units
+    return out
 
 
 def energy_scale(a: Assembly, span: float) -> float:

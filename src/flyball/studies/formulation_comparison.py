@@ -334,7 +334,7 @@ def _formulation(job: _ComparisonTask, name: str, starts: dict[str, InitialState
 
 
 def _integration(job: _ComparisonTask, name: str) -> Integration:
-    return job.asked.integration_options(FORMULATIONS[name], job.max_steps).sized(job.base.base.compiled.values.length)
+    return job.asked.integration_options(FORMULATIONS[name], job.max_steps).with_tolerance()
 
 
 def _state(c: CompiledMechanism, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -238,7 +238,7 @@ class Scales(Record, kind="Number"):
     regularization: float  # of the solve, relative
     semidefinite: float  # 1 if some mass or inertia is zero, else 0
     length: float  # a typical length [m]
-    rate: float  # characteristic rate [1/s]
+    rate: float  # characteristic rate [1/s]; 0 if neither gravity nor a speed determines it
 
 
 class System(NamedTuple):
@@ -273,6 +273,8 @@ class System(NamedTuple):
     gravity: Number1  # (3,) [m/s^2]
     scales: Scales
     units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
+    velocity_units: Number1  # (nv,): the same of each coordinate whose rate is a velocity
+    row_levers: Number1  # (nr,): factor that turns the value of a row into a length: 1, or of angles the length [m]
     mass_entries: MassEntries
     pairs: Pairs
     blocks: Blocks
@@ -282,6 +284,7 @@ class System(NamedTuple):
 
 NUMBERS = (
     "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
+    "velocity_units", "row_levers",
 )  # fmt: skip
 """Fields of `System` that hold floats: they change with parameters, and may be complex, or expressions."""
 
@@ -378,6 +381,7 @@ class Options(Record, kind="Float"):
     partitioned: float  # whether solves are for the dependent coordinates only
     deferred: float  # whether accelerations at output times are computed only when needed
     placed: float  # whether only positions and velocities are needed
+    rate: float  # characteristic rate [1/s]: that of the tables, or one per duration of the motion
 
 
 class Counts(Record, kind="Int"):

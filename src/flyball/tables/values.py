@@ -31,16 +31,14 @@ from .element_numbers import ElementNumbers, element_numbers, number_type
 from .forest import check_centred
 from .mass_properties import mass_table
 from .reference_configuration import BodyState, Poses, Refresh, free_velocities, positions, tree_frames
-from .structure_definition import Structure, TermSpec
+from .structure_definition import Structure, TermSpec, velocity_names
 from .table_definitions import FLAT, Frames, Scales, SwitchNumbers, System, zero_table
-
-DEFAULT_RATE = 1.0  # [1/s]: where there is neither gravity nor any speed
 
 
 def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray, length: Any) -> Any:
     """Characteristic rate [1/s]: half swings of a pendulum of the typical length, sqrt(g / length) / pi.
 
-    Without gravity: the fastest body or coordinate at the start, speed per length or angular speed; 1/s if all are at
+    Without gravity: the fastest body or coordinate at the start, speed per length or angular speed; 0 if all are at
     rest.
     """
     if (g := _norm(gravity)).real > 0.0:
@@ -52,8 +50,7 @@ def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray
             unit = model.unit(e.name, e)
             size = _norm(np.array([number(rate, given.env, f"{unit}/s", f"rate of {e.title}"), 0.0, 0.0]))
             speeds.append(size / length if unit == "m" else size)
-    fastest = max(speeds, key=lambda x: x.real, default=0.0)
-    return fastest if fastest.real > 0.0 else DEFAULT_RATE
+    return max(speeds, key=lambda x: x.real, default=0.0)
 
 
 def _norm(x: np.ndarray) -> Any:
@@ -62,6 +59,7 @@ def _norm(x: np.ndarray) -> Any:
 
 
 NO_LENGTH = 1e-13  # relative to the coordinates: a distance that is only rounding
+FACTOR_COLUMN = 7  # of `System.term_parameters`
 MAX_VALUES = 4  # sets of values of one structure that are cached
 REGULARISATION = 1e-9
 
@@ -209,6 +207,8 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         guard_code=table_addresses(s.guard_code), const=const,
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
+        velocity_units=np.array([length if n.unit == "m" else 1.0 for n in velocity_names(s)], dtype),
+        row_levers=np.array(_row_levers(s, terms, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(
@@ -267,6 +267,16 @@ def _units(s: Structure, length: Any) -> list[Any]:
     """Unit of every measured quantity: the mechanism's length, or a radian."""
     metric = {t.row - len(s.rows) for t in s.terms if t.measured and t.formula.measure == "m"}
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
+
+
+def _row_levers(s: Structure, terms: np.ndarray, length: Any) -> list[Any]:
+    """Length by the unit of every row: the largest of its terms', the mechanism's length or a radian by its factor."""
+    out = [0.0] * len(s.rows)
+    for t, factor in zip(s.terms, terms[:, FACTOR_COLUMN], strict=True):
+        if not t.measured:
+            unit = (-factor if factor.real < 0.0 else factor) * (length if t.formula.measure == "m" else 1.0)
+            out[t.row] = max(out[t.row], unit, key=lambda x: x.real)
+    return [length / unit if unit != 0.0 else 1.0 for unit in out]
 
 
 def _longest_vector(vectors: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ from .time_loop import (
     BEGIN_SEGMENT,
     CHECK_MISSED_CHANGE,
     CURRENT,
+    DISTANT_SIZE_WEIGHT,
     INSPECT_END,
     INSPECTED_END,
     INSPECTED_END_RATE,
@@ -38,13 +39,16 @@ from .time_loop import (
     SAVED_RATE,
     STEP_FAILED,
     TRY_STEP,
+    UNIT,
     set_rejected_width,
     step_end_time,
 )
 
-DISTANT_SIZE_WEIGHT = 1e-3  # weight in the tolerance of the part of a coordinate beyond the size of the mechanism
 UNKNOWN_ERROR = 1e300  # error of a step that was not tried, or is nan
-MIN_FIRST_STEP = 1e-7  # smallest first step, as a part of the largest step
+MIN_FIRST_STEP, SMALL_FIRST_STEP = 1e-7, 1e-6  # smallest first step, and that of small states: parts of the largest
+FIRST_STEP_PART = 0.01  # part of the time in which the state changes by its own size
+NEGLIGIBLE_NORM = 1e-5  # size of a state, or of its change over the largest step, in units of the tolerance
+NO_CHANGE = 1e-15  # change of a state, in units of the tolerance, that is none
 
 
 @formula
@@ -66,12 +70,13 @@ def stage_state(y, K, weights, stages, h, out):
 def component_tolerance(c, i, size):
     """Tolerance of component i for a value of that size.
 
-    For the first c.count.positions components, the part beyond the size of the mechanism counts little: accuracy
-    must not decrease because a wheel has turned a hundred times, or because the origin is far away.
+    For the first c.count.positions components, the part beyond their unit counts little: accuracy must not decrease
+    because a wheel has turned a hundred times, or because the origin is far away.
     """
+    unit = c.y[UNIT, i]
     if i < c.count.positions:
-        size = max(min(size, max(1.0, c.real.scale)), DISTANT_SIZE_WEIGHT * size)
-    return c.real.atol + c.real.rtol * size
+        size = max(min(size, unit), DISTANT_SIZE_WEIGHT * size)
+    return c.real.atol * unit + c.real.rtol * size
 
 
 @formula
@@ -88,13 +93,16 @@ def scaled_norm(c, a, y, n):
 def first_step_width(derivative, S, W, R, c):
     """Estimate a first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4).
 
-    The width has a lower bound, because a state that begins at rest near zero is small without changing fast.
+    The width has a lower bound, because a state that begins at rest near zero is small without changing fast. Rates
+    are taken per time in which the state changes by its own size: the width does not depend on the unit of time.
     """
     n = c.count.controlled
     y = c.y[CURRENT]
     d0 = scaled_norm(c, y, y, n)
     d1 = scaled_norm(c, c.K[0], y, n)
-    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h0 = SMALL_FIRST_STEP * c.real.h_max
+    if not (d0 < NEGLIGIBLE_NORM or d1 * c.real.h_max < NEGLIGIBLE_NORM):
+        h0 = FIRST_STEP_PART * d0 / d1
     h0 = min(max(h0, MIN_FIRST_STEP * c.real.h_max), c.real.h_max)
     for i in range(y.shape[0]):
         c.y[PROPOSED, i] = y[i] + h0 * c.K[0, i]
@@ -103,9 +111,11 @@ def first_step_width(derivative, S, W, R, c):
     for i in range(n):
         c.y[INTERPOLATED, i] = (c.K[1, i] - c.K[0, i]) / h0
     d2 = scaled_norm(c, c.y[INTERPOLATED], y, n)
-    m = max(d1, d2)
-    h1 = max(1e-6, h0 * 1e-3) if m <= 1e-15 else (0.01 / m) ** (1.0 / R.order_i[0])
-    return min(100.0 * h0, h1)
+    wide = h0 / FIRST_STEP_PART
+    m = max(d1, d2 * wide) * wide
+    if m <= NO_CHANGE:
+        return max(SMALL_FIRST_STEP * c.real.h_max, 1e-3 * h0)
+    return wide * min(1.0, (FIRST_STEP_PART / m) ** (1.0 / R.order_i[0]))
 
 
 @formula
@@ -124,7 +134,7 @@ def attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h):
     status, moved = arrive(t + h, new, c.K[stages], S, W)
     if status != 0:
         return status, 0.0
-    moved /= c.real.rtol + c.real.atol / c.real.scale
+    moved /= c.real.rtol + c.real.atol
     moved = max(moved, integral_error(R, c, h))
     error = step_error(tangent, S, W, R, c, h, False)
     if error > 1.0 and c.real.accepted_error > 0.0:
@@ -398,7 +408,7 @@ def error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
         kept[i] = y[i]
         c.y[SAVED_RATE, i] = c.K[0, i]
         if i < c.count.controlled:
-            y[i] += (STATE_ROUNDING if i % 2 == 0 else -STATE_ROUNDING) * max(abs(y[i]), 1.0)
+            y[i] += (STATE_ROUNDING if i % 2 == 0 else -STATE_ROUNDING) * max(abs(y[i]), c.y[UNIT, i])
     status, _ = arrive(c.real.t, y, c.K[0], S, W)
     other = error
     if status == 0:

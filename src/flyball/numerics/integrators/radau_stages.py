@@ -19,7 +19,7 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ..sparse_factorisation import lu_factor, lu_solve, sparse_product
 from .implicit_workspace import STEP_START
-from .time_loop import CURRENT
+from .time_loop import CURRENT, DISTANT_SIZE_WEIGHT, UNIT
 
 _ROOT = 6.0**0.5
 RADAU_C = ((4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0)
@@ -232,20 +232,19 @@ def set_step_start(c, K):
     y = c.y[CURRENT]
     nv = K.v.shape[1]
     nq = y.shape[0] - nv - K.z.shape[1]
-    size = max(1.0, c.real.scale)
     for i in range(nv):
-        x = 1.0
+        x = unit = 1.0
         if K.place[i] >= 0:
-            x = abs(y[K.place[i]])
-            x = max(min(x, size), 1e-3 * x)
-        K.tol[0, i] = K.real.atol + K.real.rtol * x
+            x, unit = abs(y[K.place[i]]), c.y[UNIT, K.place[i]]
+            x = max(min(x, unit), DISTANT_SIZE_WEIGHT * x)
+        K.tol[0, i] = K.real.atol * unit + K.real.rtol * x
         K.v[STEP_START, i] = y[nq + i]
-        K.tol[1, i] = K.real.atol + K.real.rtol * abs(y[nq + i])
+        K.tol[1, i] = K.real.atol * c.y[UNIT, nq + i] + K.real.rtol * abs(y[nq + i])
     for i in range(K.z.shape[1]):
         K.z[STEP_START, i] = y[nq + nv + i]
         K.rate[STEP_START, i] = c.K[0, nq + nv + i]
     for i in range(K.tol_x.shape[0]):
-        K.tol_x[i] = K.real.atol + K.real.rtol * abs(K.z[STEP_START, i])
+        K.tol_x[i] = K.real.atol * c.y[UNIT, nq + nv + i] + K.real.rtol * abs(K.z[STEP_START, i])
 
 
 @formula

@@ -22,12 +22,13 @@ from ...compiler.struct_layout import Float1, Float2, Int1, Record
 # StepCounts.started if no segment has begun, but only forces have jumped at its start
 FORCES_JUMPED = 2
 # rows of StepState.y: the state, the proposed one, the interpolated one; saved by trials; the previous step
-CURRENT, PROPOSED, INTERPOLATED, SAVED, SAVED_RATE, PREVIOUS, PREVIOUS_RATE, STATE_ROWS = range(8)
+CURRENT, PROPOSED, INTERPOLATED, SAVED, SAVED_RATE, PREVIOUS, PREVIOUS_RATE, UNIT, STATE_ROWS = range(9)
 # rows of StepState.seen that the integrator uses: data of inspected laws at the start and the end of a step
 INSPECTED_START, INSPECTED_START_RATE, INSPECTED_END, INSPECTED_END_RATE = range(1, 5)
 AT_START, AT_END = -2, -1  # tasks of ``inspect``: store data of the start or end, instead of checking law k
 INTEGRAL_TOLERANCE_FACTOR = 10.0  # the tolerance of integrals is this many times the relative tolerance
 RUNNING, DONE, STEP_FAILED, NOT_FINITE, OUTPUT_FAILED, TOO_MANY_STEPS = 0, 1, 2, 3, 4, 5
+DISTANT_SIZE_WEIGHT = 1e-3  # weight in the tolerance of the part of a coordinate beyond its unit
 ULP = 2.3e-16  # relative unit in the last place
 NO_INSPECTION = np.zeros((6, 0))
 
@@ -39,11 +40,10 @@ class StepReals(Record, kind="Float"):
     h: float  # width of the next step
     t_end: float
     rtol: float
-    atol: float
+    atol: float  # relative to the units of the state, ``StepState.y[UNIT]``
     h_max: float
     max_growth: float  # largest factor by which the step may grow
     largest: float  # time relative to which widths of steps are judged
-    scale: float  # length scale of positions
     energy_size: float  # scale of energies
     span: float  # duration of the whole motion
     last: float  # of the steps rejected since the last accepted one: the last error,

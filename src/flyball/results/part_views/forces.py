@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...constraints.switches.guard_kinds import BY_RATE, HELD
-from ...engine.loads import force_row, rest_speed, wrench_power
+from ...engine.loads import REST_SPEED, force_row, wrench_power
+from ...engine.rows import characteristic_rate_within
 from ...errors import AnalysisError
 from ...laws.bytecode import STACK_RESERVE, evaluate, evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
@@ -76,7 +77,9 @@ class ForceView(PartView):
         stretches = self._result.phases
         if s < 0 or stretches is None:
             return sign(rate)
-        by_rate = np.where(np.abs(rate) > rest_speed(self._x.system), sign(rate), 0.0)
+        S, t = self._x.system, self._result.t
+        slow = REST_SPEED * S.units[S.forces.F[k]] * characteristic_rate_within(S, float(t[-1] - t[0]))
+        by_rate = np.where(np.abs(rate) > slow, sign(rate), 0.0)
         return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
 
     def _rows(self) -> list[int]:

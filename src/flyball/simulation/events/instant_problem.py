@@ -120,7 +120,7 @@ class InstantProblem:
         )
         self.asked = StructBuffer(EngineCall(np.array([self.engine.address]), R, self.desk, self.output))
         self.units = switch_units(s)
-        self.characteristic_rate = float(S.scales.rate.real)
+        self.characteristic_rate = float(here.c.array("options").rate)
         self.unit, metric = switch_scales(s, c.values.length), [unit == "m" for unit in self.units]
         mass, spin = S.bodies.mass.sum(), np.trace(S.bodies.inertia.reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
@@ -328,7 +328,7 @@ def reference_rate(here: EventContext) -> float:
     short duration does not raise it: a force of the weight of a body at rest counts, however little it would move the
     body.
     """
-    return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
+    return min(float(here.c.array("options").rate), 1.0 / float(here.clock.real.span))
 
 
 def instant_problem(here: EventContext) -> InstantProblem:

@@ -79,6 +79,7 @@ class ImplicitIntegrator:
             "implicit steps", key, MOST_POOLS, lambda: self._workspace_pool(clock.y.shape[1])
         ).new()
         initialise_work(s, self._complex_tables(S).fields, lambda name: self.own.array(f"WC.{name}"))
+        self.own.array("WC.options").rate = c.array("options").rate
         if len(s.rows):
             self.own.array("plan.metric")[:] = inverse_inertias(c, float(clock.real.t), clock.y[ex.CURRENT])
         self.count = self.own.array("desk.count")

@@ -137,7 +137,7 @@ def _union_of(some: Sequence[np.ndarray]) -> np.ndarray:
 
 EXPENSIVE_FACTOR = 50  # products per unknown from which on a factorization costs more than a step
 NO_INERTIA, SLIGHT_INERTIA = 1e-14, 1e-8  # relative inertia that counts as zero, and its substitute
-THIN_METRIC = 1e-6  # smallest inertia in the metric, relative to the largest (rotations times the mechanism's length)
+THIN_METRIC = 1e-6  # smallest inertia in the metric, relative to the largest (displacements in mechanism's lengths)
 
 
 class JacobianLayout:
@@ -305,8 +305,8 @@ def inverse_inertias(c: CompiledMechanism, t: float, y: np.ndarray) -> np.ndarra
         own = S.mass_entries.row == S.mass_entries.column
         inertia = np.zeros(s.nv)
         inertia[S.mass_entries.row[own]] = W.M[own]
-    size = c.sizes**2
-    return 1.0 / (size * np.maximum(inertia / size, THIN_METRIC * (inertia / size).max(initial=0.0)))
+    per_unit = c.sizes**2 * inertia
+    return c.sizes**2 / np.maximum(per_unit, THIN_METRIC * per_unit.max(initial=0.0))
 
 
 def substitute_inertias(c: CompiledMechanism) -> np.ndarray:

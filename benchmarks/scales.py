@@ -1,0 +1,200 @@
+"""Mechanisms in other units of length, mass and time, by powers of two: every number of the result is the scaled one.
+
+Usage: ``python benchmarks/scales.py [--seeds N] [--only TEXT ...] [--all-differences]``. Without options all examples
+and 200 random mechanisms in all six scales. What may differ, and why, is listed in `EXEMPT`.
+
+Where libraries may round otherwise in other units: ``pow`` of the C library, and LAPACK where a matrix mixes units (of
+motions, none does). Code made for one mechanism is not compared: whether it is used depends on the time that its
+compilation takes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+import runpy
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import numpy as np
+from fuzzing import content, scenes, verdicts
+from fuzzing.scaling import Scale, Unsupported, scaled
+
+import flyball as fb
+from flyball.simulation.integration_options import BAUMGARTE_RATE
+
+UNDERFLOW = 1e-290  # smaller numbers are equal: near the smallest ones that there are, digits are lost
+ROOT = Path(__file__).resolve().parents[1]
+SCALES = {
+    "mass up": Scale(mass=2.0**20), "mass down": Scale(mass=2.0**-20),
+    "time up": Scale(time=2.0**10), "time down": Scale(time=2.0**-10),
+    "length up": Scale(length=2.0**10), "length down": Scale(length=2.0**-10),
+}  # fmt: skip
+SPAN = 0.2  # of an example [s]
+OUTPUTS = 11
+MAX_STEPS = 3000
+FAMILIES = (*content.FAMILIES, *scenes.SCENES)
+Made = tuple[fb.Mechanism, float, dict[str, Any]]
+
+
+def cases(seeds: int) -> Iterator[tuple[str, Callable[[], Made]]]:
+    """Names, and functions that return (mechanism, time span, options)."""
+    for path in sorted((ROOT / "examples").glob("*.*")):
+        if path.suffix in (".toml", ".py"):
+            yield path.name, lambda path=path: _example(path)
+    for family in FAMILIES:
+        for seed in range(seeds):
+            yield f"{family} {seed}", lambda family=family, seed=seed: _random(family, seed)
+
+
+def _example(path: Path) -> Made:
+    m = fb.load(path) if path.suffix == ".toml" else runpy.run_path(str(path))["mechanism"]()
+    # steps by impulses have a width and a tolerance in units: they are given, so that they can be converted
+    contact = any(isinstance(e, fb.Contact) for e in m.elements())
+    return m, SPAN, {"method": fb.Stepping(step=0.005)} if contact else {}
+
+
+def _random(family: str, seed: int) -> Made:
+    case = verdicts.made(family, seed)
+    dropped = ("outputs", "max_steps")
+    return case.mechanism, case.t_end, {k: v for k, v in case.options.items() if k not in dropped}
+
+
+NOT_CONVERTED = {
+    **dict.fromkeys(("cam_follower.toml", "gear_backlash.toml"), "play with weights"),
+    **dict.fromkeys(("clock_escapement.toml", "geneva_drive.toml", "safety_brake.toml"), "events set parameters"),
+    **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "wrecking_ball.py"), "sets of bodies"),
+    "planetary.py": "a sensor of the mean of two rates",
+}
+"""Examples that `fuzzing.scaling` cannot write in other units."""
+EXEMPT = {
+    "shaken": "elastic ropes: places within a step at which both the force and the gap of a rope are guards",
+    **dict.fromkeys(
+        (
+            *scenes.SCENES, "conveyor.toml", "gripper.py", "labyrinth.py", "newtons_cradle.py", "rocking_block.toml",
+            "tippe_top.py",
+        ),
+        "steps by impulses: 1e-6 m/s below which nothing bounces, 1e-9 m of lookahead at stops, pow() of overlaps",
+    ),
+}  # fmt: skip
+"""What may differ beyond mass (ropes: by mass and time), by example or family, and why."""
+
+
+def is_exempt(name: str, scale: str) -> bool:
+    """Whether a case may differ in that scale."""
+    known = name if name in EXEMPT else name.partition(" ")[0]
+    return known in EXEMPT and (known == "shaken" or not scale.startswith("mass"))
+
+
+def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
+    """Options of `simulate` in other units."""
+    out = dict(options)
+    for name in ("max_step", "step"):
+        if out.get(name) is not None:
+            out[name] = out[name] * s.time
+    if out.get("stabilization") == "baumgarte":  # its default rates are 10/s
+        for name in ("alpha", "beta"):
+            out[name] = (out.get(name) or BAUMGARTE_RATE) / s.time
+    if isinstance(method := out.get("method"), fb.Stepping):
+        changed = {"step": None if method.step is None else method.step * s.time}
+        if method.tolerance is not None:
+            changed["tolerance"] = method.tolerance * s.length / s.time
+        out["method"] = dataclasses.replace(method, **changed)
+    return out
+
+
+def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) -> dict[str, Any]:
+    """Everything a motion says, in the units before scaling: arrays, and texts without numbers."""
+    chosen = {"outputs": OUTPUTS, "progress": False} | options
+    if not any(isinstance(e, fb.Contact) for e in m.elements()):  # impulse time stepping has other options
+        chosen = {"max_steps": MAX_STEPS, "specialize": False} | chosen
+    try:
+        run = m.simulate(t_end, **in_units(chosen, s))
+    except fb.FlyballError as error:
+        return {"error": type(error).__name__}
+    out: dict[str, Any] = {"t": run.t / s.time}
+    out["events"] = [f"{e.name} {e.kind}" for e in run.events]
+    out["event times"] = np.array([e.t for e in run.events]) / s.time
+    out["energy lost"] = np.array([e.lost for e in run.events]) / s.of("J")
+    out["counts"] = [run.health.steps, run.health.rejected]
+    out["warnings"] = len(run.health.warnings)
+    for name, (unit, values) in run.channels().items():
+        try:
+            curve = np.asarray(values) / s.of(unit)
+            out[name] = np.where(np.abs(curve) < UNDERFLOW, 0.0, curve)
+        except KeyError:
+            continue
+    return out
+
+
+def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
+    """What differs, and by how much relative to the largest value."""
+    out = [f"{k} is in one result only" for k in one.keys() ^ other.keys()]
+    for k in one.keys() & other.keys():
+        a, b = one[k], other[k]
+        if not isinstance(a, np.ndarray):
+            out += [f"{k}: {a!r:.60} and {b!r:.60}"] if a != b else []
+        elif a.shape != b.shape:
+            out.append(f"{k}: shapes {a.shape} and {b.shape}")
+        elif not np.array_equal(a, b, equal_nan=True):
+            size = np.nanmax(np.abs(a), initial=1e-300)
+            off = np.nanmax(np.abs(a - b), initial=0.0) / size
+            first = int(np.argmax(np.asarray(a != b).reshape(len(a), -1).any(axis=1))) if a.ndim else 0
+            out.append(f"{k}: {off:.2g} from output {first}")
+    return out
+
+
+def compared(made: Made, names: list[str]) -> Iterator[tuple[str, list[str] | str]]:
+    """(scale, differences or why there is no comparison) of each scale."""
+    m, t_end, options = made
+    own: dict[str, Any] | None = None
+    for name in names:
+        s = SCALES[name]
+        try:
+            other = scaled(m, s)
+        except Unsupported as why:
+            yield name, str(why)
+            continue
+        own = own or answers(scaled(m, Scale()), t_end, options, Scale())
+        yield name, differences(own, answers(other, t_end * s.time, options, s))
+
+
+def main() -> None:
+    """Compare and report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5, help="random mechanisms of each family")
+    parser.add_argument("--only", nargs="*", default=[], help="cases whose names contain one of these")
+    parser.add_argument("--scales", nargs="*", default=list(SCALES))
+    parser.add_argument("--all-differences", action="store_true")
+    asked = parser.parse_args()
+    total: Counter[str] = Counter()
+    warnings.simplefilter("ignore")
+    for name, make in cases(asked.seeds):
+        if asked.only and not any(x in name for x in asked.only):
+            continue
+        for scale, found in compared(make(), asked.scales):
+            if isinstance(found, str):
+                print(f"{name:30} {scale:12} none: {found}", flush=True)
+                total["none"] += 1
+                continue
+            total[f"{scale}: {'differs' if found else 'equal'}"] += 1
+            if found:
+                total["failed"] += not is_exempt(name, scale)
+                what = found if asked.all_differences else sorted(found)[:2]
+                print(f"{name:30} {scale:12} {len(found)}: " + "; ".join(what), flush=True)
+    for k, n in sorted(total.items()):
+        print(f"{k}: {n}")
+    sys.exit(total["failed"] > 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""No threshold in metres, seconds or kilograms: in other units every number of a motion is the scaled one, bit by bit.
+
+Units are powers of two of the former ones, so that converting is exact. ``python benchmarks/scales.py`` runs all
+examples and 200 random mechanisms in six scales; `scales.EXEMPT` lists what may differ, and why.
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+import scales
+from fuzzing import content
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
+)
+SMALL_SLOW, LARGE_FAST = scales.Scale(2.0**-10, 2.0**20, 2.0**10), scales.Scale(2.0**10, 2.0**-20, 2.0**-10)
+CASES = dict(scales.cases(1))
+EXAMPLES = [name for name in CASES if "." in name and name not in scales.NOT_CONVERTED]
+RANDOM = [f"{family} 0" for family in content.FAMILIES]
+EXACT = [name for name in (*EXAMPLES, *RANDOM) if not scales.is_exempt(name, "length up")]
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_motion_in_other_units_is_the_same_to_the_last_bit(name):
+    m, t_end, options = CASES[name]()
+    own = scales.answers(scales.scaled(m, scales.Scale()), t_end, options, scales.Scale())
+    assert name in RANDOM or "error" not in own
+    for s in (SMALL_SLOW, LARGE_FAST):
+        assert not scales.differences(own, scales.answers(scales.scaled(m, s), t_end * s.time, options, s))
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in EXACT])
+def test_steps_by_impulses_do_not_depend_on_the_unit_of_mass(name):
+    assert dict(scales.compared(CASES[name](), ["mass up", "mass down"])) == {"mass up": [], "mass down": []}
+
+
+@pytest.mark.parametrize("name", scales.NOT_CONVERTED)
+def test_what_is_left_out_cannot_be_converted(name):
+    with pytest.raises(scales.Unsupported):
+        scales.scaled(CASES[name]()[0], SMALL_SLOW)
