@@ -415,7 +415,8 @@ def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, 
 
 SAME_EVENTS = ("coordinates", "dop853", "rk45", "radau", "axes", "order", "parameters", "file")
 HOLDS = ("close", "stick", "lock", "latch", "taut", "touch", "rest")
-SWITCHED = (*HOLDS, "open", "slip", "overrun", "unlatch", "slack", "part", "impact")
+RELEASES = ("open", "slip", "overrun", "unlatch", "slack", "part")
+SWITCHED = (*HOLDS, *RELEASES, "impact")
 NOTED = 1e-4  # of the whole time: instants may differ by
 STILL, LOOKS = 10.0, 21  # times that, if nothing moves between them; times at which that is seen
 
@@ -437,7 +438,7 @@ def _happened(b: Base, run: Any, h: int) -> str:
     for one, two, which in ((*lists, "only at first"), (*lists[::-1], "only then")):
         for name, kind, t in one:
             alike = any((name, kind) == (n, k) and abs(t - s) <= near for n, k, s in two)
-            left = [[k in HOLDS for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)]
+            left = [[k not in RELEASES for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)]
             alike = alike or (all(left) and left[0][-1] == left[1][-1] and kind in SWITCHED)
             alike = alike or (kind in HOLDS and t <= near)
             alike = alike or any(
