@@ -68,8 +68,8 @@ def test_a_block_on_a_smooth_floor_swings_on_its_spring() -> None:
     assert len(rough.modes()) == 0  # it sticks
     m.add(fb.Ground("wall", shape=fb.Plane(normal=(1, 0, 0)), position=(0.4, 0, 0)))
     beside = m.modes()
-    assert len(beside) == 0 and "wall-block-1, wall-block-2 about to part" in str(beside)
-    assert "about to part" in str(m.linearize())
+    assert len(beside) == 0 and "wall-block-1, wall-block-2 about to open" in str(beside)
+    assert "about to open" in str(m.linearize())
 
 
 def test_a_box_on_springs_that_touches_a_stop_has_nothing_left() -> None:

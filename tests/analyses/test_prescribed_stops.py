@@ -57,7 +57,7 @@ def test_friction_in_what_drivers_move_is_followed():
         fb.JointFriction("pin", "A", static=0.3, radius=0.01),
     )
     m = slider_crank(*friction)
-    r, k = m.simulate(2.0, outputs=41), m.kinematics(41, t_end=2.0)
+    r, k = m.simulate(2.0, outputs=81), m.kinematics(81, t_end=2.0)
     assert r["drive.effort"] == pytest.approx(k["drive.effort"], abs=1e-12) and r.health.rejected == 0
     # the guide carries D.fy: power of friction mu |N| |v| by the trapezoidal rule on fine times, away from the ends
     t = np.linspace(0.0, 2.0, 4001)

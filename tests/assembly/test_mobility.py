@@ -140,7 +140,7 @@ def test_missing_inertia_that_nothing_needs_is_fine():
     """A point mass on a revolute: its rotation moves its mass."""
     r = example("point_mass_pendulum.toml").simulate(0.5)
     assert r.health.success
-    assert r.energy.drift < 1e-7
+    assert r.energy.drift < 1e-7 * r.energy.kinetic.max()
 
 
 def test_a_long_chain_is_counted_by_the_sparse_rank():

@@ -40,7 +40,7 @@ def four_bar():
 def test_joint_coordinates_have_no_answer_of_their_own(made):
     """There the tree joint would carry all; rows share by their size, which is what is taken and told."""
     with pytest.raises(
-        fb.AnalysisError, match=r"rub .* follow reactions that the constraints of .* leave undetermined"
+        fb.AnalysisError, match=r"rub .* follow reactions that the redundant constraints of .* leave undetermined"
     ):
         made().simulate(0.1, coordinates="joint")
     r = made().simulate(0.1, outputs=2)

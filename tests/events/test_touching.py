@@ -330,4 +330,4 @@ def test_a_slip_is_let_go_with_the_friction_that_it_held():
     ]
     found = x, np.full(3, AT_REST), np.array([np.inf, 3.0, 3.0]), np.full(3, 1e-9)
     out = instant_problem.sliding_at_cone(n, parts, found, np.zeros(0, int))
-    assert [-p.gain * x[0] * p.lean for _, p in sorted(out.items())] == pytest.approx(x[1:], rel=1e-14)
+    assert [-p.gain * x[0] * p.direction for _, p in sorted(out.items())] == pytest.approx(x[1:], rel=1e-14)

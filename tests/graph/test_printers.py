@@ -193,7 +193,7 @@ def test_python_functions_are_handed_over():
 def test_python_functions_are_refused_by_name(language, printer):
     if language == "CasADi":
         pytest.importorskip("casadi")
-    with pytest.raises(ModelError, match=f"is a Python function, and force calls it: {language} knows"):
+    with pytest.raises(ModelError, match=f"is a Python function, and force calls it: {language} supports"):
         printer(called())
 
 

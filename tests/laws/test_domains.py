@@ -266,7 +266,8 @@ def test_a_driver_whose_acceleration_jumps_is_followed(exponent, coordinates, sw
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
 def test_an_output_time_at_which_a_driver_asks_for_an_infinite_acceleration_names_it(coordinates):
-    r = driven_along("max(t - 1, 0)**1.5", swinging=True).simulate(2.0, outputs=9, coordinates=coordinates)
+    m = driven_along("max(t - 1, 0)**1.5", swinging=True)
+    r = m.simulate(2.0, outputs=9, coordinates=coordinates, rtol=1e-6)
     np.testing.assert_array_equal(np.isnan(r["b"].ax), r.t == 1.0)
     (text,) = r.health.warnings
     assert "the first t = 1 s" in text

@@ -128,7 +128,7 @@ def test_a_second_process_compiles_nothing(runs):
 def test_the_right_hand_side_is_compiled_once(runs):
     """One engine holds it, whatever is simulated: planar, spatial, with and without constraints."""
     _, first, _ = runs
-    assert set(first["fallen"]) == {"engine", "kinematics_over_time"}
+    assert set(first["fallen"]) == {"engine", "kinematics_over_time", "record_motion_kernel"}
 
 
 def test_adding_a_joint_and_a_force_touches_nothing_else(runs):

@@ -113,7 +113,7 @@ def test_nothing_to_stabilise():
     ("ask", "told"),
     [
         (lambda m: m.simulate(1.0, alpha=3.0), "alpha is a rate of stabilization='baumgarte'"),
-        (lambda m: m.simulate(1.0, stabilization="none"), "stabilization='none' does nothing: in joint coordinates"),
+        (lambda m: m.simulate(1.0, stabilization="none"), "stabilization='none' has no effect: in joint coordinates"),
         (
             lambda m: m.compare(1.0, formulations=["projection"], alpha=3.0),
             "alpha is a rate of the formulation 'baumgarte'",
@@ -134,8 +134,8 @@ def test_nothing_to_stabilise():
         (lambda m: m.simulate(1, max_step="0 s"), "max_step must be greater than 0"),
         (lambda m: m.modes(frozen="yes"), "frozen is True or False"),
         (lambda m: m.modes(about=m.simulate(0.1), t=1), "about has its own time"),
-        (lambda m: m.sensitivity(["b.x"], ["k"], t_end=1), "t_end is of a motion"),
-        (lambda m: m.sensitivity(["b.x"], ["k"], rtol=1e-3), "rtol is of a motion"),
+        (lambda m: m.sensitivity(["b.x"], ["k"], t_end=1), "t_end applies to a motion"),
+        (lambda m: m.sensitivity(["b.x"], ["k"], rtol=1e-3), "rtol applies to a motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], about="equilibrium"), "about is for modes"),
         (lambda m: m.optimize(["b.x"], ["k"], minimize=sum, weights=2), "with minimize they have no effect"),
         (lambda m: m.optimize(["b.x"], ["k"], target=[0], evaluations=0), "evaluations must be at least 1"),

@@ -152,7 +152,7 @@ def test_code_on_disk_is_taken_where_there_is_something_to_gain(maker):
     """Motions that are too short to make code for."""
     assert not four_bar().simulate(3.0).health.engine.startswith("made")
     maker.where = "disk"
-    assert not four_bar().simulate(0.1).health.engine.startswith("made")
+    assert not four_bar().simulate(0.03).health.engine.startswith("made")
     assert four_bar().simulate(3.0).health.engine.startswith("made")
 
 

@@ -161,7 +161,7 @@ def test_singular_positions_are_refused():
         m.add(planar_rod(name, p, q))
     for name, i, j, at in (("A", "ground", "a", 0), ("B", "a", "b", 1), ("C", "b", "c", 3), ("D", "ground", "c", 2)):
         m.add(fb.Revolute(name, i, j, at=(at, 0)))
-    with pytest.raises(fb.SingularityError, match="singular position at t = 0 s: the constraints of C depend"):
+    with pytest.raises(fb.SingularityError, match="singular position at t = 0 s: the constraints of C are dependent"):
         m.symbolic(coordinates="joint").explicit()
 
 

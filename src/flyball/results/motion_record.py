@@ -61,7 +61,12 @@ class MotionRecord:
         return {name: getattr(self, name) for name in ("rows", "solved", "deferred", "figures")}
 
 
-def record_motion(result: Result, work: PooledBuffer | None = None, accelerations: bool = True) -> MotionRecord:
+def record_motion(
+    result: Result,
+    work: PooledBuffer | None = None,
+    accelerations: bool = True,
+    system: System | None = None,
+) -> MotionRecord:
     """Evaluate a motion at some of its output times.
 
     Parameters
@@ -71,6 +76,8 @@ def record_motion(result: Result, work: PooledBuffer | None = None, acceleration
         Workspace with the options of the run. Not given: a new one, without stabilization.
     accelerations : bool
         Whether to check accelerations.
+    system : System
+        Tables that the run used if one set of parameters held throughout, which compiled code has been given already.
     """
     n, count, steps = len(result.t), result.health.evaluations, result.health.steps
     s, S, deferred = result.values.structure, result.values.system, result.deferred_accelerations is not None
@@ -97,8 +104,8 @@ def record_motion(result: Result, work: PooledBuffer | None = None, acceleration
     span = float(result.t[-1] - result.t[0]) if n else 0.0
     least = NEGLIGIBLE_ACCELERATION / max(span, SHORTEST_SPAN) ** 2 if span > 0.0 else 0.0
     buffers = work, idle_tableau(), idle_clock_pool(states.shape[1] - 1 - s.nv).new(), no_output(), out
-    for system, first, last in _systems(result, rows):
-        tables = struct_tables(s, system)
+    for part, first, last in _systems(result, rows, system):
+        tables = struct_tables(s, part)
         record_motion_kernel(engine.address, tables, *buffers, least, stride, deferred, first, last)
     for k in s.kept.get("own energies", None, 1, lambda: _own_energies(s)):
         f = s.forces[k]
@@ -119,10 +126,10 @@ def _pool(s: Structure, S: System, n: int, switched: bool) -> StructPool:
     return StructPool(RecordedFigures(np.zeros((n, 1 + ny + nv)), modes, metric, *map(np.zeros, shapes)))
 
 
-def _systems(result: Result, rows: np.ndarray) -> list[tuple[System, int, int]]:
+def _systems(result: Result, rows: np.ndarray, system: System | None) -> list[tuple[System, int, int]]:
     """Return the tables with the parameters of each part of the recorded times, and its first and last time."""
     if result.phases is None:
-        return [(result.values.system, 0, len(rows))]
+        return [(system or result.values.system, 0, len(rows))]
     cuts = [(at.stop, phases.all[0].values.system) for at, phases in result.phases.pieces()]
     ends = np.searchsorted(rows, [stop for stop, _ in cuts]).tolist()
     return [(S, first, last) for (_, S), first, last in zip(cuts, [0, *ends], ends, strict=False)]

@@ -88,7 +88,7 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
             )
         why = f"{_size_in_words(c)} (absolute coordinates need {_size_in_words(a.compiled)}, and more time)"
     else:
-        why = "as asked for"
+        why = "as requested"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cut_joints(c)}"
 

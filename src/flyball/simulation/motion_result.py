@@ -149,7 +149,7 @@ def make_result(
     if here.recorder is not None:
         here.recorder.told(result)
         result.contacts = event_driven_contacts(result)
-    result.record = record_motion(result, a.compiled.scratch)
+    result.record = record_motion(result, a.compiled.scratch, system=a.compiled.system)
     if unsolved is not None and not result.record.solved:
         _ = result.vdot  # adds to the remarks where there are no accelerations
     health.late = motion_judgements(result, partial(mobility, model, start.base))

@@ -338,8 +338,8 @@ class StiffnessMonitor:
         lately = self._recent_steps(clock)
         self._mark(clock)
         if not lately.width > 0.0 or not self._other_method_pays(c, clock, lately, now):
-            self.row = 0
-            if now == EXPLICIT_METHOD:
+            agreed, self.row = self.row, 0
+            if now == EXPLICIT_METHOD and not agreed:  # few rejected steps by chance do not postpone the next check
                 self.every = max(
                     self.every,
                     min(2 * self.every, int(CHECK_COST / (CHECK_SHARE * EXPLICIT_STAGES * evaluation_time(c)))),

@@ -71,7 +71,7 @@ class EquationSymbols(SymbolTable):
     def __init__(
         self, model: Model, chosen: CoordinateChoice, o: SymbolicOptions, parameter_values: Mapping[str, Symbol]
     ) -> None:
-        self.model, self._asked = model, o
+        self.model, self._options = model, o
         self.tree, self.coordinates = chosen  # names of the tree joints; description of the coordinates
         self.described = model  # before inputs and numbers became symbols
         self.graph = Graph()
@@ -121,7 +121,7 @@ class EquationSymbols(SymbolTable):
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs, in the requested order; their symbols are 0 unless they are given."""
-        return self._asked.inputs
+        return self._options.inputs
 
     def expression(self, name: str) -> Expressions:
         """A symbol by its name, to calculate with."""
@@ -218,7 +218,7 @@ class EquationSymbols(SymbolTable):
     @cached_property
     def assembly(self) -> Assembly:
         """Initial state in these coordinates."""
-        return initial_assembly(self.model, self._asked.parameters, self.tree)
+        return initial_assembly(self.model, self._options.parameters, self.tree)
 
     @cached_property
     def start(self) -> dict[str, float]:
@@ -438,7 +438,7 @@ class Linearization:
 
     described: Model  # without the inputs
     tree: tuple[str, ...]
-    _operating_point: Any
+    _options: Any
 
     def linear(
         self,
@@ -480,7 +480,7 @@ class Linearization:
         from .linear.linear_equations import LinearizationOptions, linearize_about
 
         for name in balanced_by:
-            if name in self._operating_point.inputs:
+            if name in self._options.inputs:
                 raise ModelError(
                     f"balanced_by names {name!r}, an input, which is what is added at the point: let its element "
                     f"have a parameter of its own ({name!r} with torque='tau' or force='F', 'tau' and 'F' among the "
@@ -492,13 +492,13 @@ class Linearization:
         return linearize_about(
             self.described,
             LinearizationOptions(
-                inputs=self._operating_point.inputs,
+                inputs=self._options.inputs,
                 outputs=outputs,
                 at=at,
                 coordinates="joint" if self.tree else "absolute",
                 independent=independent,
                 balanced_by=balanced_by,
-                parameters=self._operating_point.parameters,
+                parameters=self._options.parameters,
                 tree=self.tree,
             ),
         )
