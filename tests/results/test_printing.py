@@ -87,7 +87,7 @@ def test_simulating_takes_few_calls():
     _, files = counted(lambda: m.simulate(1.0))
     own = [x for x in files if "flyball" in x]
     assert len(own) < 600
-    assert len(set(own)) <= 42
+    assert len(set(own)) <= 40
 
 
 def test_the_recorded_energies_are_those_of_the_result():

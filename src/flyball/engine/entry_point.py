@@ -70,10 +70,17 @@ from .kinematics import store_ground_frames
 from .motion import derivative, follow_drivers, project_and_evaluate, report_state, solve_response
 from .pulse_detection import INSPECTION_ROWS, inspect_step
 from .residual import force_slopes, residual
-from .rows import characteristic_rate_within
 from .stabilization import project_error, update_positions, update_velocities
 
 MAX_KEPT_LAYOUTS = 4  # layouts of workspaces and tables that are cached for each structure
+
+
+DEFAULT_RATE = 1.0  # [1/s]: at an instant, where there is neither gravity nor any speed
+
+
+def characteristic_rate_within(S: System, span: float = 0.0) -> float:
+    """Characteristic rate [1/s] for a motion of that duration, which sets it where nothing else does."""
+    return float(S.scales.rate.real) or (1.0 / span if span > 0.0 else DEFAULT_RATE)
 
 
 def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Work:

@@ -20,7 +20,7 @@ from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub
-from ..tables.table_definitions import BIAS, RATE, VALUE, System
+from ..tables.table_definitions import BIAS, RATE, VALUE
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7
@@ -321,14 +321,6 @@ def row_times(S, W, k, x):
     for e in range(S.row_start[k], S.row_start[k + 1]):
         s += W.G[e] * x[S.column[e]]
     return s
-
-
-DEFAULT_RATE = 1.0  # [1/s]: at an instant, where there is neither gravity nor any speed
-
-
-def characteristic_rate_within(S: System, span: float = 0.0) -> float:
-    """Characteristic rate [1/s] for a motion of that duration, which sets it where nothing else does."""
-    return float(S.scales.rate.real) or (1.0 / span if span > 0.0 else DEFAULT_RATE)
 
 
 @formula

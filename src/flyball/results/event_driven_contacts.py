@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..constraints.switches.guard_kinds import OFF
+from ..engine.entry_point import characteristic_rate_within
 from ..engine.loads import direction_in_space
-from ..engine.rows import characteristic_rate_within
 from ..math.vec import dot
 from ..model.body import GROUND
 from ..model.contact_point import Touch

@@ -12,9 +12,8 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..engine.entry_point import FOLLOW, INTEGRATE
+from ..engine.entry_point import FOLLOW, INTEGRATE, characteristic_rate_within
 from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
-from ..engine.rows import characteristic_rate_within
 from ..engine.stabilization import TIGHT_G, TIGHT_V
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
 from ..laws.breakpoints import NO_BREAKPOINTS

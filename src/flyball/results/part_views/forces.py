@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...constraints.switches.guard_kinds import BY_RATE, HELD
+from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
-from ...engine.rows import characteristic_rate_within
 from ...errors import AnalysisError
 from ...laws.bytecode import STACK_RESERVE, evaluate, evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
