@@ -144,7 +144,7 @@ def factor_schur(S, W):
 
 # added to the entries of a row for its size, relative to the ratio of both units. With 1 the regularisation of long
 # mechanisms of short links is too large to pass singular positions, with 0.05 it is small at the tightest tolerances
-LEAST_ENTRY = 0.1  # added to entries of rows, in units of the mechanism: 1 regularises long mechanisms of short links too much
+LEAST_ENTRY = 0.1
 
 
 @formula
