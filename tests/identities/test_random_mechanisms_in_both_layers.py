@@ -76,7 +76,9 @@ def absolute(r, structure):
 @pytest.mark.parametrize(
     "family",
     [
-        pytest.param(f, marks=pytest.mark.xfail(reason="reactions near a singular position: 2e-8"))
+        pytest.param(
+            f, marks=pytest.mark.xfail(reason="seed 7: a contradictory row of small entries is regularised too little")
+        )
         if f == "singular"
         else f
         for f in FAMILIES

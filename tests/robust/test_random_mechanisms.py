@@ -29,15 +29,7 @@ MOST = 6000  # steps of stiff ones here: one that rings on for more is looked at
 
 
 @pytest.mark.filterwarnings("ignore::flyball.PerformanceNotice")
-@pytest.mark.parametrize(
-    "family",
-    [
-        pytest.param(f, marks=pytest.mark.xfail(reason="seed 34733: 0.4 % of the energy at a change point, unsaid"))
-        if f == "parallel_cranks"
-        else f
-        for f in FAMILIES
-    ],
-)
+@pytest.mark.parametrize("family", FAMILIES)
 def test_healthy_or_refused_by_name(family):
     """A failure names its seed: ``python benchmarks/fuzz.py --families FAMILY --first SEED --count 1`` shows it again."""
     kinds = []

@@ -494,9 +494,9 @@ def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
     It is estimated from the accelerations over a step, if there are more steps than rows and the estimate is much
     larger.
     """
-    r, none = x.result, np.zeros_like(x.kinetic)
-    gain = r.record.figures.gain[:, x.bodies].sum(axis=1)
-    known = np.isfinite(gain)
+    r, none, figures = x.result, np.zeros_like(x.kinetic), x.result.record.figures
+    gain = figures.gain[:, x.bodies].sum(axis=1)
+    known = np.isfinite(gain) & ~(figures.violation > MAX_ACCELERATION_VIOLATION)  # wrong ones estimate nothing
     if not known.any() or r.health.steps <= len(r.t) or r.health.options.get("step"):
         return none
     found = (float(np.ptp(r.t)) / r.health.steps) ** 2 * np.interp(x.t, x.t[known], gain[known])
