@@ -128,6 +128,17 @@ def test_elastic_ones(name, coordinates):
     assert force_on(r)["b"] == pytest.approx(carried, abs=1e-9)
 
 
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_pin_breaks_at_its_strength(coordinates):
+    """It carries what accelerates the second block, 2/3 of the push; then each block moves by itself."""
+    r = run(SAMPLES["ShearPin"][0], coordinates)
+    (broken,) = r.events["part"]
+    assert broken.t == pytest.approx(np.arcsin(1.9 / (PUSH * 2.0 / 3.0)) - PHASE, rel=1e-9)
+    after = r.t > broken.t
+    assert not r["part"].force[after].any()
+    assert np.ptp(r["c"].velocity[after, 0]) < 1e-12
+
+
 def test_pin_that_breaks_at_the_start():
     r = run(lambda L, M, T: fb.ShearPin("part", "P.displacement", strength=1.0), "joint")
     assert [(x.t, x.kind, x.name) for x in r.events] == [(0.0, "break", "part")]
