@@ -142,17 +142,12 @@ def factor_schur(S, W):
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
-# added to the entries of a row for its size, relative to the ratio of both units. With 1 the regularisation of long
-# mechanisms of short links is too large to pass singular positions, with 0.05 it is small at the tightest tolerances
-LEAST_ENTRY = 0.1
-
-
 @formula
 def factor_coupled(S, W):
     """Factor [M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M in place of M in delta.
 
-    For delta, a part of the ratio of both units (the mechanism's length or a radian) is added to the entries of G: the
-    size of a row along which the forest cannot move, now or ever, must not vanish with its entries.
+    For delta, the sizes that entries of G have for the length of a body are added to them: the size of a row along
+    which the forest cannot move, now or ever, must not vanish with its entries.
     """
     nv = W.velocities.solved.shape[0]
     per = W.velocities.scratch_1
@@ -167,12 +162,10 @@ def factor_coupled(S, W):
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
         s = 0.0 * W.rows.diagonal[k]
-        unit = S.scales.length / S.row_levers[k]
         for e in range(S.row_start[k], S.row_start[k + 1]):
             W.A[S.pairs.place[e]] = W.G[e]
             if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities do not count
-                ratio = LEAST_ENTRY * unit / S.velocity_units[S.column[e]]
-                s += (W.G[e] * W.G[e] + ratio * ratio) * per[S.column[e]]
+                s += (W.G[e] * W.G[e] + S.entry_sizes[e] * S.entry_sizes[e]) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
         W.rows.diagonal[k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.scales.regularization * s

@@ -275,6 +275,7 @@ class System(NamedTuple):
     units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
     velocity_units: Number1  # (nv,): the same of each coordinate whose rate is a velocity
     row_levers: Number1  # (nr,): factor that turns the value of a row into a length: 1, or of angles the length [m]
+    entry_sizes: Number1  # (nG,): size of each entry of Work.G for the length of a body
     mass_entries: MassEntries
     pairs: Pairs
     blocks: Blocks
@@ -284,7 +285,7 @@ class System(NamedTuple):
 
 NUMBERS = (
     "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
-    "velocity_units", "row_levers",
+    "velocity_units", "row_levers", "entry_sizes",
 )  # fmt: skip
 """Fields of `System` that hold floats: they change with parameters, and may be complex, or expressions."""
 

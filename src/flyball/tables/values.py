@@ -207,8 +207,9 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         guard_code=table_addresses(s.guard_code), const=const,
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
-        velocity_units=np.array([length if n.unit == "m" else 1.0 for n in velocity_names(s)], dtype),
-        row_levers=np.array(_row_levers(s, terms, length), dtype),
+        velocity_units=_velocity_units(s, length, dtype),
+        row_levers=length / _row_units(s, terms, length),
+        entry_sizes=_entry_sizes(s, terms, _body_length(s, frames.position, length)),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(
@@ -269,14 +270,36 @@ def _units(s: Structure, length: Any) -> list[Any]:
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
-def _row_levers(s: Structure, terms: np.ndarray, length: Any) -> list[Any]:
-    """Length by the unit of every row: the largest of its terms', the mechanism's length or a radian by its factor."""
+def _velocity_units(s: Structure, length: Any, dtype: Any) -> np.ndarray:
+    """Unit of each coordinate whose rate is a velocity: the length or a radian."""
+    return np.array([length if n.unit == "m" else 1.0 for n in velocity_names(s)], dtype)
+
+
+def _row_units(s: Structure, terms: np.ndarray, length: Any) -> np.ndarray:
+    """Unit of every row: the largest of its terms', the length or a radian by its factor; the length if all are 0."""
     out = [0.0] * len(s.rows)
     for t, factor in zip(s.terms, terms[:, FACTOR_COLUMN], strict=True):
         if not t.measured:
             unit = (-factor if factor.real < 0.0 else factor) * (length if t.formula.measure == "m" else 1.0)
             out[t.row] = max(out[t.row], unit, key=lambda x: x.real)
-    return [length / unit if unit != 0.0 else 1.0 for unit in out]
+    return np.array([unit if unit != 0.0 else length for unit in out], terms.dtype)
+
+
+def _body_length(s: Structure, places: np.ndarray, otherwise: Any) -> Any:
+    """Largest distance from a centre of mass to a frame on its body; ``otherwise`` if all are centres."""
+    on_bodies = places[s.tables["frame_body"] >= 0]
+    longest = _longest_vector(on_bodies)[0] if len(on_bodies) else 0.0
+    return longest if longest.real > 0.0 else otherwise
+
+
+def _entry_sizes(s: Structure, terms: np.ndarray, length: Any) -> np.ndarray:
+    """Unit of the row by the unit of the velocity, for every entry of G; 0 for those of measured quantities."""
+    units = _row_units(s, terms, length)
+    count = np.diff(s.tables["row_start"])[: len(units)]
+    out = np.zeros(len(s.tables["column"]), terms.dtype)
+    of_rows = s.tables["column"][: count.sum()]
+    out[: len(of_rows)] = np.repeat(units, count) / _velocity_units(s, length, terms.dtype)[of_rows]
+    return out
 
 
 def _longest_vector(vectors: np.ndarray) -> np.ndarray:

@@ -114,11 +114,10 @@ def coupled(x: TracedEquations) -> SinglePass:
     K = np.zeros((nv + nr, nv + nr), object)
     K[:nv, :nv] = x.M
     K[nv:, :nv] = x.G
-    lever = min(1.0, float(x.system.scales.length.real)) ** 2
     for k in range(nr):
         size: Any = 0.0
-        for d in inertia_velocities(x, k):
-            size = size + (x.G[k, d] * x.G[k, d] + lever) / x.M[d, d]
+        for d, least in zip(inertia_velocities(x, k), entry_sizes(x, k), strict=True):
+            size = size + (x.G[k, d] * x.G[k, d] + least * least) / x.M[d, d]
         K[nv + k, nv + k] = -x.system.scales.regularization * (1.0 if size == 0.0 else size)
     below = [(i, j) for i in range(nv + nr) for j in possible_entries(K[i, :i])]
     i, j = np.array(below, np.int64).reshape(-1, 2).T
@@ -140,8 +139,21 @@ def inertia_velocities(x: TracedEquations, k: int) -> list[int]:
     S = x.system
     if k >= len(S.rows.law):  # row of a driver that prescribes a velocity
         return possible_entries(x.G[k])
-    entries = range(S.row_start[k], S.row_start[k + 1])
-    return [int(S.column[e]) for e in entries if S.pairs.place[e] < len(S.ldl.Ai)]
+    return [int(S.column[e]) for e in inertia_entries(x, k)]
+
+
+def entry_sizes(x: TracedEquations, k: int) -> np.ndarray:
+    """Size of the entry of row k in the column of each of its `inertia_velocities`."""
+    S = x.system
+    if k >= len(S.rows.law):
+        return np.ones(len(possible_entries(x.G[k])))  # the row has the unit of the velocity that it prescribes
+    return S.entry_sizes[inertia_entries(x, k)]
+
+
+def inertia_entries(x: TracedEquations, k: int) -> list[int]:
+    """Entries of row k, of those in `Work.G`, except in columns of prescribed velocities."""
+    S = x.system
+    return [e for e in range(S.row_start[k], S.row_start[k + 1]) if S.pairs.place[e] < len(S.ldl.Ai)]
 
 
 def possible_entries(row: np.ndarray) -> list[int]:
