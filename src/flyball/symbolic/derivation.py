@@ -6,7 +6,7 @@ from ..errors import ModelError
 from ..expression_graph.graph import Symbol
 from ..model.element_laws import with_inputs
 from ..model.model import Model, suggest
-from ..model.unsupported_elements import acts_while_sliding, refuse_unsupported
+from ..model.unsupported_elements import acts_while_sliding, refuse_sampled_controllers, refuse_unsupported
 from .coordinates import choose_coordinates
 from .equations import Equations, SymbolicOptions
 from .parametrized_model import ParametrizedModel
@@ -16,7 +16,8 @@ NAME_CHOICES = ("parameters", "all", "none")
 
 def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     """Equations of motion as expressions: see `Mechanism.symbolic`."""
-    refuse_unsupported(model, "symbolic", acts_while_sliding)
+    refuse_unsupported(model, "symbolic", acts_while_sliding, controlled=True)
+    refuse_sampled_controllers(model, "symbolic")
     if o.names not in NAME_CHOICES:
         raise ModelError(
             f"names is {o.names!r}{suggest(o.names, NAME_CHOICES)}; must be one of {', '.join(NAME_CHOICES)}"

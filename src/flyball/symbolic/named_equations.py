@@ -35,6 +35,7 @@ from ..math.scalar import atan2
 from ..math.spline import BREAKS
 from ..math.vec import mtv, sub
 from ..model.body import Body, Driver, Frame
+from ..model.controller_signals import ConnectedState
 from ..model.element import Element
 from ..model.joint import Joint
 from ..tables.forest import coordinate_row
@@ -64,7 +65,7 @@ def mechanism_symbols(x: Values) -> MechanismSymbols:
     q = _coordinates(s, v)
     rates = [_rate(p) if p.kind == "coordinate" else p for p in v]
     seconds = [_second(p) if p.kind == "coordinate" else _rate(p, "acceleration") for p in v]
-    states = [_state(name) for name in s.states]
+    states = [_controller_state(c) for c in s.controls] + [_state(name) for name in s.states[len(s.controls) :]]
     loads = [Symbol(f"{e.name}.load", "load", rf"P_{{{latex_part_name(e.name)}}}", "N", e.name) for e in s.loads]
     return MechanismSymbols(q, rates, seconds, states, _multipliers(s), loads)
 
@@ -122,6 +123,11 @@ def _dotted(dot: str, latex: str) -> str:
     """A dot over the letter, not over its indices."""
     letter, _, rest = latex.partition("_")
     return f"{dot}{{{letter}}}" + (f"_{rest}" if rest else "")
+
+
+def _controller_state(x: ConnectedState) -> Symbol:
+    index = latex_part_name(x.controller.name)
+    return Symbol(x.name, "state", rf"\mathrm{{{latex_part_name(x.state)}}}_{{{index}}}", "", x.controller.name)
 
 
 def _state(name: str) -> Symbol:
@@ -371,7 +377,7 @@ def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
         replace(p, equation=_cleaned_entry(cleaned, p.equation), rate=_cleaned_entry(cleaned, p.rate)) for p in places
     ]
     vdot = [graph.symbol(a) for a in names.vdot]
-    named = {n.data.name: n for n in (T.t, *T.q, *T.v, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
+    named = {n.data.name: n for n in (T.t, *T.q, *T.v, *T.states, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
     return NamedEquations(x, T, own_q, drawn, vdot, places, cleaned, named)
 
 
@@ -409,7 +415,7 @@ def _cleaner(
     s, unknown = x.structure, []
     owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
     for name, at in s.state_at.items():
-        if name.endswith((".work", ".place")):
+        if at < len(s.controls) or name.endswith((".work", ".place")):
             continue
         t = owners.get(name)
         found = None if t is None else angles.of(t.owner, t.what, t.F, t.M)
@@ -441,7 +447,7 @@ def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
         G[k] = 0.0
         G[k, S.tree.v[b]] = 1.0
         if S.tree.work[b] >= 0:
-            T.powers[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
+            T.zdot[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
     return replace(
         T,
         lam=lam,
@@ -452,7 +458,7 @@ def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
     )
 
 
-ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powers", "returned")
+ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "zdot", "returned")
 
 
 def _cleaned_arrays(T: TracedEquations, cleaned: TurnElimination) -> TracedEquations:
@@ -478,13 +484,16 @@ def quaternions(x: NamedEquations) -> list[list[Node]]:
 CURVE_SAMPLES = 20  # initial samples of a curve between two breaks
 
 
-def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
+def state_by_symbol(
+    x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray, z: Sequence[float] | np.ndarray
+) -> dict[str, Any]:
     """Arrays of the engine as values by symbol names."""
     T = x.traced
     out: dict[str, Any] = {T.t.data.name: t}
     for symbol, drawn, value in zip(T.q, x.drawn, q, strict=True):
         out[symbol.data.name] = _python_number(value + drawn.real)
-    return out | {symbol.data.name: _python_number(value) for symbol, value in zip(T.v, v, strict=True)}
+    others = (*zip(T.v, v, strict=True), *zip(T.states, z, strict=False))
+    return out | {symbol.data.name: _python_number(value) for symbol, value in others}
 
 
 def _python_number(x: Any) -> Any:

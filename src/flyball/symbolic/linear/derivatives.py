@@ -1,10 +1,10 @@
 """A mechanism's equations traced for linearisation, and their derivatives by state, multipliers and inputs.
 
-    r = M vdot - f - G^T lam,  g,  n = G v - nu,  y
+    r = M vdot - f - G^T lam,  g,  n = G v - nu,  s = zdot,  y
 
 are differentiated by positions (along the velocities, so that quaternions have three directions), velocities,
-accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions' directions,
-d(G^T lam)/dx, is in dr/dx.
+controller states, accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions'
+directions, d(G^T lam)/dx, is in dr/dx.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ...model.contact import has_contact
 from ...model.element_laws import Input, with_inputs
 from ...model.model import Model
 from ...model.quantities import single_quantity
+from ...model.unsupported_elements import refuse_sampled_controllers
 from ...results.health import Health
 from ...results.result import Result
 from ...tables.structure import Choices, structure
@@ -57,6 +58,8 @@ class TracedMechanism:
         Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts).
     r : ndarray (nv,)
         M vdot - f - G^T lam - efforts.
+    s : ndarray (nz,)
+        Rates of the controller states, the first of the states z.
     holonomic : ndarray of bool (rows,)
     laws : list of (index of coordinate, index of velocity, Node, Node)
         Prescribed coordinates, and the expressions of their values and rates.
@@ -73,6 +76,7 @@ class TracedMechanism:
     n: np.ndarray
     multipliers: list[Node]
     r: np.ndarray
+    s: np.ndarray
     holonomic: np.ndarray
     laws: list[tuple[int, int, Node, Node]]
 
@@ -95,6 +99,11 @@ class TracedMechanism:
     def added(self) -> list[Node]:
         """Symbols of the inputs that are no parameters of the mechanism: zero at the point."""
         return [self.given[i.parameter] for i in self.inputs if i.name != i.parameter]
+
+    @property
+    def controls(self) -> list[str]:
+        """Names of the controller states."""
+        return [x.name for x in self.values.structure.controls]
 
     @cached_property
     def scale(self) -> np.ndarray:
@@ -133,8 +142,9 @@ def trace_mechanism(
     Raises
     ------
     ModelError
-        If there is no such input, or the mechanism has contact or laws that are Python functions.
+        If there is no such input, or the mechanism has contact, sampled controllers or laws that are Python functions.
     """
+    refuse_sampled_controllers(model, "symbolic")
     if has_contact(model):
         raise ModelError(
             f"{model.name!r} has contact, which is no set of equations; linearize takes it where it rests, in numbers"
@@ -165,7 +175,7 @@ def trace_mechanism(
         values=V, x=x, given=given, env=V.env, inputs=named, names=velocity_names(s), vdot=vdot,
         g=object_vector([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
         n=object_vector([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
-        multipliers=[*x.lam, *efforts], r=r,
+        multipliers=[*x.lam, *efforts], r=r, s=x.state_rates,
         holonomic=np.array([*(row.holonomic for row in s.rows), *(True for _ in laws)], bool), laws=laws,
     )  # fmt: skip
 
@@ -197,7 +207,7 @@ def _prescribed(x: TracedEquations) -> list[tuple[int, int, Node, Node]]:
     return out
 
 
-BY = ("x", "v", "a", "l", "w")
+BY = ("x", "v", "z", "a", "l", "w")
 
 
 @dataclass
@@ -207,9 +217,9 @@ class Perturbed:
     Attributes
     ----------
     value : dict
-        ``"r"``, ``"g"``, ``"n"``, ``"y"`` -> values.
+        ``"r"``, ``"g"``, ``"n"``, ``"s"``, ``"y"`` -> values.
     by : dict
-        ``"rx"`` -> derivatives of r by positions, and so on: rows ``r``, ``g``, ``n``, ``y``, columns `BY`.
+        ``"rx"`` -> derivatives of r by positions, and so on: rows ``r``, ``g``, ``n``, ``s``, ``y``, columns `BY`.
     N : ndarray (nv, nv)
         (rate of a change of position) = (change of velocity) + N (change of position).
     T : ndarray (nq, nv)
@@ -244,7 +254,7 @@ class Derivatives:
 
     def __init__(self, m: TracedMechanism, outputs: Sequence[Node]) -> None:
         self.m = m
-        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "y": _row(outputs)}
+        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "s": m.s, "y": _row(outputs)}
         self.ends = np.cumsum([0, *(len(b) for b in self.blocks.values())])
         nodes = [x for b in self.blocks.values() for x in b]
         self.nodes = nodes
@@ -252,7 +262,7 @@ class Derivatives:
         along = [list(zip(x.q, x.T[:, d], strict=True)) for d in range(len(x.v))]
         seeds = {"x": [[(q, t) for q, t in a if t != 0.0] for a in along]}
         seeds |= {k: [[(s, 1.0)] for s in of] for k, of in zip(
-            BY[1:], (x.v, m.vdot, m.multipliers, m.pushed), strict=True
+            BY[1:], (x.v, x.states, m.vdot, m.multipliers, m.pushed), strict=True
         )}  # fmt: skip
         self.columns = {k: [directional_derivatives(nodes, s) for s in of] for k, of in seeds.items()}
         self.N = _turning(m)

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.force_balance import usual_states
 from ...derivatives.reduced_equations import gap_lengths
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute
 from ...expression_graph.graph import SYMBOL, Node, zero_objects
 from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
-from .derivatives import Derivatives, TracedMechanism
+from .derivatives import Derivatives, Perturbed, TracedMechanism
 from .elimination import (
     DependentEquations,
     identically_zero,
@@ -72,10 +73,14 @@ def _forces(m: TracedMechanism, point: OperatingPoint) -> tuple[np.ndarray, np.n
 
 
 def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.ndarray, f: Freedoms) -> list[Node]:
-    """Forces along the free coordinates, which vanish at an equilibrium; identically zero ones are left out."""
+    """Forces along the free coordinates, and rates of controller states, which vanish at an equilibrium.
+
+    Identically zero ones are left out.
+    """
     r = zero_objects(len(m.r), 1)
-    r[:, 0] = substitute(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
-    found = substitute(list(matrix_product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
+    left = substitute([*m.r, *m.s], [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
+    r[:, 0] = left[: len(r)]
+    found = substitute([*matrix_product(f.Zv.T, r)[:, 0], *left[len(r) :]], [(s, 0.0) for s in m.added])
     return not_identically_zero(found)
 
 
@@ -85,15 +90,15 @@ def not_identically_zero(nodes: Sequence[Any]) -> list[Node]:
     return [x for x in told if not x.known]
 
 
-def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at: dict[str, float]) -> None:
+def refuse_unbalanced(m: TracedMechanism, f: Freedoms, p: Perturbed, at: dict[str, float]) -> None:
     """Refuse a point that is no equilibrium with the parameters' own values.
 
     Parameters
     ----------
     m : TracedMechanism
     f : Freedoms
-    stiffness : ndarray
-        Derivatives of r by positions there.
+    p : Perturbed
+        Derivatives there.
     at : dict
         Values at the point of all symbols that are no parameters with their own values.
 
@@ -112,17 +117,30 @@ def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at
     r = np.array(values_and_sizes(list(m.r), at)) * m.scale[:, None]
     Z = nominal_values(f.Zv) / m.scale[:, None] * m.scale[f.chosen_v]
     left, terms = Z.T @ r[:, 0], np.abs(Z).T @ r[:, 1]
-    near = np.abs(nominal_values(stiffness) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
+    near = np.abs(nominal_values(p.by["rx"]) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
     for d, x, own in zip(f.chosen_v, left, terms, strict=True):
         if abs(x) > BALANCE_TOLERANCE * (own + 1e-3 * r[:, 1].max()) + ZERO_FORCE_TOLERANCE * near[d]:
             name = m.names[d]
-            others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
-            raise ModelError(
-                f"{m.model.name!r} is in no equilibrium there: {x / m.scale[d]:.6g} "
-                f"{'N' if name.unit == 'm' else 'N m'} are left along {name.name}. Give another point, for instance "
-                f"at=m.equilibrium(), or name a parameter that has the value which balances it: "
-                f"balanced_by=[...]{others}"
-            )
+            unit = "N" if name.unit == "m" else "N m"
+            raise _unbalanced_error(m, f"{x / m.scale[d]:.6g} {unit} are left along {name.name}", moving)
+    moved = np.abs(nominal_values(p.by["sx"]) * m.scale * m.values.length).sum(axis=1)
+    between = np.abs(nominal_values(p.by["sz"]))
+    decay = np.diag(between)
+    z = np.abs([at[s.data.name] for s in m.x.states])
+    usual = usual_states(z, moved, between, np.where(decay > 0.0, decay, decay.max(initial=0.0) or 1.0))
+    may = ZERO_FORCE_TOLERANCE * (moved + between @ usual)
+    for name, (x, own), least in zip(m.controls, values_and_sizes(list(m.s), at), may, strict=True):
+        if abs(x) > BALANCE_TOLERANCE * own + least:
+            raise _unbalanced_error(m, f"{name!r} changes by {x:.3g} in a second", moving)
+
+
+def _unbalanced_error(m: TracedMechanism, what: str, moving: bool) -> ModelError:
+    others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
+    return ModelError(
+        f"{m.model.name!r} is in no equilibrium there: {what}. Give another point, for instance at=m.equilibrium(), or "
+        f"name a parameter{' or controller state' if m.controls else ''} that has the value which balances it: "
+        f"balanced_by=[...]{others}"
+    )
 
 
 def unsteady_error(m: TracedMechanism) -> AnalysisError:
@@ -143,7 +161,7 @@ def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence
     at : sequence of Node
         The conditions.
     names : sequence of str
-        As many parameters, in which the conditions are linear.
+        As many parameters or controller states, in which the conditions are linear.
 
     Raises
     ------

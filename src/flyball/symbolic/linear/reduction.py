@@ -1,8 +1,10 @@
 """Elimination of the constraints from linear equations, and the matrices A, B, C, D.
 
-With the changes x of position, u = x' - N x of velocity, l of the multipliers and w of the inputs,
+With the changes x of position, u = x' - N x of velocity, z of the controller states, l of the multipliers and w of the
+inputs,
 
-    M u' + D u + K x + R l + r_w w = 0,    G x + g_w w = 0,    G u + V x + n_w w + g_w w' = 0,
+    M u' + D u + K x + r_z z + R l + r_w w = 0,    G x + g_w w = 0,    G u + V x + n_w w + g_w w' = 0,
+    z' = s_x x + s_u u + s_z z + s_w w,
 
 x = Z a + X w and u = Zv b + P a + U w + U1 w'. Multipliers are eliminated by Y with Y^T R = 0, which is Zv unless
 friction depends on the reactions. Independent rows and coordinates are chosen by the values of the parameters,
@@ -143,16 +145,16 @@ IMPROPER_TOLERANCE = (
 
 @dataclass
 class ReducedLinearEquations:
-    """Linear equations in s = (a, b): columns are s, the inputs, their first and their second rates.
+    """Linear equations in y = (a, b, z): columns are y, the inputs, their first and their second rates.
 
     Attributes
     ----------
     rate : ndarray (n, n + 3 m)
-        s' as a linear function of the columns.
-    position, velocity, acceleration, multipliers : ndarray
-        Changes of all positions, velocities, accelerations and multipliers.
+        y' as a linear function of the columns.
+    position, velocity, acceleration, multipliers, states : ndarray
+        Changes of all positions, velocities, accelerations, multipliers and controller states.
     M, D, K : ndarray (f, f) or None
-        M a'' + D a' + K a = 0, where all constraints are on positions.
+        M a'' + D a' + K a = 0, where all constraints are on positions and there are no controller states.
     """
 
     rate: np.ndarray
@@ -160,6 +162,7 @@ class ReducedLinearEquations:
     velocity: np.ndarray
     acceleration: np.ndarray
     multipliers: np.ndarray
+    states: np.ndarray
     M: np.ndarray | None
     D: np.ndarray | None
     K: np.ndarray | None
@@ -174,9 +177,9 @@ def reduce_linear(m: TracedMechanism, p: Perturbed, f: Freedoms) -> ReducedLinea
         If a free motion has no inertia.
     """
     by, nv, k = p.by, len(m.names), len(m.inputs)
-    na, nb = f.Z.shape[1], f.Zv.shape[1]
+    na, nb, nz = f.Z.shape[1], f.Zv.shape[1], len(m.s)
     X = -_dependent(f.rows, f.chosen, f.held, by["nv"], by["gw"])
-    none = zero_objects(nv, k)
+    none, still = zero_objects(nv, k), zero_objects(nv, nz)
     holonomic = np.array([m.holonomic[i] for i in f.rows_v], bool)
     rates = zero_objects(len(by["gw"]), k)
     rates[f.rows_v[holonomic]] = by["gw"][f.rows_v[holonomic]]
@@ -185,12 +188,18 @@ def reduce_linear(m: TracedMechanism, p: Perturbed, f: Freedoms) -> ReducedLinea
         -_dependent(f.rows_v, f.chosen_v, f.held, by["nv"], right)
         for right in (matrix_product(V, f.Z), _sum(matrix_product(V, X), by["nw"]), rates)
     )
-    x = np.hstack([f.Z, zero_objects(nv, nb), X, none, none])
-    u = np.hstack([P, f.Zv, U, U1, none])
+    x = np.hstack([f.Z, zero_objects(nv, nb), still, X, none, none])
+    u = np.hstack([P, f.Zv, still, U, U1, none])
+    z = np.hstack([zero_objects(nz, na + nb), _identity(nz), zero_objects(nz, 3 * k)])
     a_dot = _sum(u, matrix_product(p.N, x))[f.chosen]
-    known = _sum(matrix_product(P, a_dot), np.hstack([zero_objects(nv, na + nb), none, U, U1]))
-    acting = np.hstack([zero_objects(nv, na + nb), by["rw"], none, none])
-    others = _sum(matrix_product(by["rv"], u), matrix_product(by["rx"], x), acting)
+    known = _sum(matrix_product(P, a_dot), np.hstack([zero_objects(nv, na + nb + nz), none, U, U1]))
+    others, z_dot = (
+        _sum(
+            matrix_product(by[f"{of}v"], u), matrix_product(by[f"{of}x"], x), matrix_product(by[f"{of}z"], z),
+            np.hstack([zero_objects(n, na + nb + nz), by[f"{of}w"], zero_objects(n, 2 * k)]),
+        )
+        for of, n in (("r", nv), ("s", nz))
+    )  # fmt: skip
     Y = _left_null_space(f, by["rl"])
     mass = matrix_product(Y.T, matrix_product(by["ra"], f.Zv))
     forces = matrix_product(Y.T, _sum(matrix_product(by["ra"], known), others))
@@ -205,12 +214,18 @@ def reduce_linear(m: TracedMechanism, p: Perturbed, f: Freedoms) -> ReducedLinea
         rest = np.setdiff1d(np.arange(nv), np.r_[f.chosen_v, f.held])
         lam[f.rows_v] = -solve_equations(by["rl"][np.ix_(rest, f.rows_v)], left[rest])
     second: tuple[Any, Any, Any] = (None, None, None)
-    if na == nb and len(f.rows) == len(f.rows_v):
+    if na == nb and len(f.rows) == len(f.rows_v) and not nz:
         turned = -matrix_product(p.N, f.Z)  # u = Z a' + turned a
         D = matrix_product(Y.T, _sum(matrix_product(by["ra"], turned), matrix_product(by["rv"], f.Z)))
         K = matrix_product(Y.T, _sum(matrix_product(by["rv"], turned), matrix_product(by["rx"], f.Z)))
         second = (mass, D, K)
-    return ReducedLinearEquations(np.vstack([a_dot, b_dot]), x, u, acceleration, lam, *second)
+    return ReducedLinearEquations(np.vstack([a_dot, b_dot, z_dot]), x, u, acceleration, lam, z, *second)
+
+
+def _identity(n: int) -> np.ndarray:
+    out = zero_objects(n, n)
+    np.fill_diagonal(out, 1.0)
+    return out
 
 
 def _sum(*parts: np.ndarray) -> np.ndarray:
@@ -305,18 +320,18 @@ def state_space_matrices(
         )
     here, rates = ([m.names[d] for d in of] for of in (f.chosen, f.chosen_v))
     still = [(s, 0.0) for s in m.added]
-    new = lambda X: None if X is None else _replaced(X, still)  # noqa: E731
+    new = lambda X: None if X is None else replaced(X, still)  # noqa: E731
     return StateSpaceMatrices(
-        states=(*(x.name for x in here), *(f"{x.name} rate" for x in rates)),
-        state_units=(*(x.unit for x in here), *(f"{x.unit}/s" for x in rates)),
+        states=(*(x.name for x in here), *(f"{x.name} rate" for x in rates), *m.controls),
+        state_units=(*(x.unit for x in here), *(f"{x.unit}/s" for x in rates), *("" for _ in m.controls)),
         inputs=tuple(i.name for i in m.inputs),
         input_units=tuple(i.unit for i in m.inputs),
         outputs=tuple(name for name, _ in outputs),
         output_units=tuple(unit for _, unit in outputs),
-        A=_replaced(A, still),
-        B=_replaced(B + matrix_product(A, shift), still),
-        C=_replaced(C, still),
-        D=_replaced(D + matrix_product(C, shift), still),
+        A=replaced(A, still),
+        B=replaced(B + matrix_product(A, shift), still),
+        C=replaced(C, still),
+        D=replaced(D + matrix_product(C, shift), still),
         mass=new(r.M),
         damping=new(r.D),
         stiffness=new(r.K),
@@ -324,7 +339,8 @@ def state_space_matrices(
     )
 
 
-def _replaced(X: np.ndarray, pairs: Sequence[tuple[Node, float]]) -> np.ndarray:
+def replaced(X: np.ndarray, pairs: Sequence[tuple[Node, float]]) -> np.ndarray:
+    """A matrix with symbols replaced."""
     out = X.copy()
     out.ravel()[:] = substitute(list(X.ravel()), pairs)
     return out
@@ -339,5 +355,6 @@ def _outputs(p: Perturbed, r: ReducedLinearEquations, n: int, k: int) -> np.ndar
     """Derivatives of the outputs by the states, the inputs and their rates, (outputs, n + 3 k)."""
     y = matrix_product(p.by["yx"], r.position) + matrix_product(p.by["yv"], r.velocity)
     y = y + matrix_product(p.by["ya"], r.acceleration) + matrix_product(p.by["yl"], r.multipliers)
+    y = y + matrix_product(p.by["yz"], r.states)
     y[:, n : n + k] = y[:, n : n + k] + p.by["yw"]
     return y
