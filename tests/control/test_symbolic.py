@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flyball as fb
-from examples import governor_pi
 from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.control.slide import TIGHT, pendulum, slide
+from tests.mechanisms import example
 
 sp = pytest.importorskip("sympy")
 
@@ -98,9 +98,9 @@ def test_what_does_not_rest_is_refused():
 
 def test_a_steady_motion_under_control():
     """A flyball governor with an integral, at speed: eigenvalues for other gains."""
-    L = governor_pi.mechanism(ki=8.0).symbolic().linear(["shaft.angle_rate"])
+    L = example("governor_pi.py", ki=8.0).symbolic().linear(["shaft.angle_rate"])
     for kp in (20.0, 30.0):
-        N = governor_pi.mechanism(ki=8.0, kp=kp).linearize(coordinates="joint")
+        N = example("governor_pi.py", ki=8.0, kp=kp).linearize(coordinates="joint")
         assert L.states == N.states
         assert np.sort_complex(L.eigenvalues(kp=kp)) == pytest.approx(np.sort_complex(N.eigenvalues), abs=1e-10)
 

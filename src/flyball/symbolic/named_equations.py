@@ -25,12 +25,11 @@ from ..constraints.curve import point
 from ..constraints.registry import Kind
 from ..engine.kinematics import load_record, twist_column
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
-from ..engine.rows import BY_TIME, row_parameters
+from ..engine.rows import row_parameters
 from ..errors import ModelError
 from ..expression_graph.evaluation import evaluate, nodes_in_order
 from ..expression_graph.graph import ADD, MULTIPLY, NUMBER, Graph, Node, Symbol, object_vector
-from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations
-from ..laws.bytecode import evaluate_jet
+from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations, with_prescribed_rows
 from ..math.scalar import atan2
 from ..math.spline import BREAKS
 from ..math.vec import mtv, sub
@@ -148,8 +147,7 @@ def _multipliers(s: Structure) -> list[Symbol]:
     names = [_row_name(row.element, row.label) for row in s.rows]
     names = list(numbered_names(names))
     out = [_multiplier(s, name, row.element) for name, row in zip(names, s.rows, strict=True)]
-    later = sorted(s.prescribed, key=lambda k: s.slices[k].start)
-    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in later]
+    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in s.prescribed]
 
 
 def _row_name(e: Element, label: str) -> str:
@@ -372,7 +370,7 @@ def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
     new = [(foot, place.symbol) for foot, place in zip(feet, places, strict=True)]
     cleaned = _cleaner(x, T, own_q, more, new)
     lam = [*T.lam, *(graph.symbol(e) for e in names.lam[nr:])]
-    T = _cleaned_arrays(_prescribed(T, S, lam), cleaned)
+    T = _cleaned_arrays(with_prescribed_rows(T, lam, drawn), cleaned)
     places = [
         replace(p, equation=_cleaned_entry(cleaned, p.equation), rate=_cleaned_entry(cleaned, p.rate)) for p in places
     ]
@@ -431,31 +429,6 @@ def _cleaner(
         else:
             new.append((z, found))
     return TurnElimination(T.graph, new, unknown)
-
-
-def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
-    """Coordinates that drivers prescribe as constraints q = f(t), with the effort as multiplier."""
-    s = T.structure
-    order = sorted(s.prescribed, key=lambda k: s.slices[k].start)
-    g, nu, G, gamma = [], [], np.zeros((len(order), s.nv), object), []
-    for k, name in enumerate(order):
-        b = s.prescribed[name]
-        f = evaluate_jet(S.code, S.const, S.tree.law[b], T.work.stack, T.t, T.work.sensed, BY_TIME)
-        g.append(T.q[S.tree.q[b]] - f[0])
-        nu.append(f[1])
-        gamma.append(f[2])
-        G[k] = 0.0
-        G[k, S.tree.v[b]] = 1.0
-        if S.tree.work[b] >= 0:
-            T.zdot[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
-    return replace(
-        T,
-        lam=lam,
-        g=np.r_[T.g, object_vector(g)],
-        nu=np.r_[T.nu, object_vector(nu)],
-        G=np.vstack([T.G, G]),
-        gamma=np.r_[T.gamma, object_vector(gamma)],
-    )
 
 
 ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "zdot", "returned")

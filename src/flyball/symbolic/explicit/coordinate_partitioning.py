@@ -15,12 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...derivatives.reduced_equations import gap_lengths, normalised_rows
-from ...engine.rows import BY_TIME
 from ...errors import ModelError, SingularityError
 from ...expression_graph.evaluation import evaluate, evaluate_array
-from ...expression_graph.graph import zero_objects
 from ...expression_graph.tracing import TracedEquations
-from ...laws.bytecode import evaluate_jet
 from ...model.model import listing, suggest
 from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
 from ...tables.structure_definition import Structure, velocity_names
@@ -48,26 +45,11 @@ class Constraints:
 
 
 def collect_constraints(x: TracedEquations) -> Constraints:
-    """Collect constraints: rows in the order of the multipliers, then prescribed coordinates."""
-    s, S, W = x.structure, x.system, x.work
-    there = len(x.g) > len(s.rows)  # prescribed coordinates are already among the rows
-    n = 0 if there else len(s.prescribed)
-    later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
-    G, g, nu, gamma = zero_objects(n, s.nv), zero_objects(n), zero_objects(n), zero_objects(n)
-    for k, b in enumerate(s.prescribed[name] for name in later[:n]):
-        law = S.tree.law[b]
-        value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
-        G[k, S.tree.v[b]] = 1.0
-        g[k] = x.q[S.tree.q[b]] - (value - S.bodies.offset[b])
-        nu[k], gamma[k] = rate, second
-    return Constraints(
-        [r.element.name for r in s.rows] + later,
-        np.array([r.holonomic for r in s.rows] + [True] * len(later), bool),
-        np.concatenate([x.g, g]),
-        np.concatenate([x.G.reshape(-1, s.nv), G]),
-        np.concatenate([x.nu, nu]),
-        np.concatenate([x.gamma, gamma]),
-    )
+    """Constraints of equations that have rows for prescribed coordinates (`with_prescribed_rows`)."""
+    s = x.structure
+    elements = [*(r.element.name for r in s.rows), *s.prescribed]
+    holonomic = np.array([*(r.holonomic for r in s.rows), *(True for _ in s.prescribed)], bool)
+    return Constraints(elements, holonomic, x.g, x.G, x.nu, x.gamma)
 
 
 DEPENDENCE_TOLERANCE = 1e-8  # smallest motion of an independent coordinate, relative to the largest

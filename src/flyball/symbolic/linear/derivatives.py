@@ -20,8 +20,13 @@ from ...engine.kinematics import quaternion_at
 from ...errors import ModelError
 from ...expression_graph.evaluation import directional_derivatives, evaluate, substitute
 from ...expression_graph.graph import Graph, Node, Symbol, object_vector, zero_objects
-from ...expression_graph.tracing import TracedEquations, object_tables, parameter_symbols, trace_equations
-from ...laws.bytecode import BY_TIME, evaluate_jet
+from ...expression_graph.tracing import (
+    TracedEquations,
+    object_tables,
+    parameter_symbols,
+    trace_equations,
+    with_prescribed_rows,
+)
 from ...model.contact import has_contact
 from ...model.element_laws import Input, with_inputs
 from ...model.model import Model
@@ -52,17 +57,11 @@ class TracedMechanism:
         Names of all velocities.
     vdot : list of Node
         Symbols of the accelerations.
-    g, n : ndarray (rows,)
-        Constraints on positions, and on velocities, G v - nu; prescribed coordinates follow the rows.
-    multipliers : list of Node
-        Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts).
+    n : ndarray (rows,)
+        Constraints on velocities, G v - nu; prescribed coordinates follow the rows.
     r : ndarray (nv,)
-        M vdot - f - G^T lam - efforts.
-    s : ndarray (nz,)
-        Rates of the controller states, the first of the states z.
+        M vdot - f - G^T lam.
     holonomic : ndarray of bool (rows,)
-    laws : list of (index of coordinate, index of velocity, Node, Node)
-        Prescribed coordinates, and the expressions of their values and rates.
     """
 
     values: Values
@@ -72,18 +71,29 @@ class TracedMechanism:
     inputs: list[Input]
     names: list[VelocityName]
     vdot: list[Node]
-    g: np.ndarray
     n: np.ndarray
-    multipliers: list[Node]
     r: np.ndarray
-    s: np.ndarray
     holonomic: np.ndarray
-    laws: list[tuple[int, int, Node, Node]]
 
     @property
     def graph(self) -> Graph:
         """The graph of all expressions."""
         return self.x.graph
+
+    @property
+    def g(self) -> np.ndarray:
+        """Constraints on positions, (rows,); prescribed coordinates follow the rows."""
+        return self.x.g
+
+    @property
+    def s(self) -> np.ndarray:
+        """Rates of the controller states, (nz,)."""
+        return self.x.state_rates
+
+    @property
+    def multipliers(self) -> list[Node]:
+        """Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts)."""
+        return self.x.lam
 
     @property
     def model(self) -> Model:
@@ -162,22 +172,13 @@ def trace_mechanism(
     V = values(s, given)  # type: ignore[arg-type]
     x = trace_equations(s, V.system if given else object_tables(V.system), graph)
     vdot = [graph.symbol(Symbol(f"a[{d}]", "acceleration", f"a_{{{d}}}")) for d in range(s.nv)]
-    laws = _prescribed(x)
-    efforts = [graph.symbol(Symbol(f"effort[{k}]", "multiplier")) for k in range(len(laws))]
-    r = x.M @ np.array(vdot, object) - x.f
-    if x.lam:
-        r = r - x.G.T @ np.array(x.lam, object)
-    for (_, d, _, _), effort in zip(laws, efforts, strict=True):
-        r[d] = r[d] - effort
+    efforts = [graph.symbol(Symbol(f"effort[{k}]", "multiplier")) for k in range(len(s.prescribed))]
+    x = with_prescribed_rows(x, [*x.lam, *efforts])
+    v, lam = object_vector(x.v), object_vector(x.lam)
+    r = x.M @ object_vector(vdot) - x.f - x.G.T @ lam
     r[:] = substitute(list(r), list(zip(x.loads, x.returned, strict=True)))
-    n = (x.G @ np.array(x.v, object) - x.nu).tolist() if x.lam else []
-    return TracedMechanism(
-        values=V, x=x, given=given, env=V.env, inputs=named, names=velocity_names(s), vdot=vdot,
-        g=object_vector([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
-        n=object_vector([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
-        multipliers=[*x.lam, *efforts], r=r, s=x.state_rates,
-        holonomic=np.array([*(row.holonomic for row in s.rows), *(True for _ in laws)], bool), laws=laws,
-    )  # fmt: skip
+    holonomic = np.array([*(row.holonomic for row in s.rows), *(True for _ in efforts)], bool)
+    return TracedMechanism(V, x, given, V.env, named, velocity_names(s), vdot, x.G @ v - x.nu, r, holonomic)
 
 
 def refuse_unknown(model: Model, outputs: Sequence[str]) -> None:
@@ -192,18 +193,6 @@ def _with_values(model: Model, changed_parameters: Mapping[str, float]) -> Model
     out.environment(changed_parameters)  # refuses unknown parameters
     for name, x in changed_parameters.items():
         out.parameters[name] = x
-    return out
-
-
-def _prescribed(x: TracedEquations) -> list[tuple[int, int, Node, Node]]:
-    """Prescribed coordinates: indices of coordinate and velocity, expressions of value and rate."""
-    S, s = x.system, x.structure
-    stack = zero_objects(s.depth + 1, 3)
-    out = []
-    for b in s.prescribed.values():
-        f, f1, _ = evaluate_jet(S.code, S.const, int(S.tree.law[b]), stack, x.t, zero_objects(3, 0), BY_TIME)
-        law = x.graph.node(f - S.bodies.offset[b])
-        out.append((int(S.tree.q[b]), int(S.tree.v[b]), law, x.graph.node(f1)))
     return out
 
 
@@ -254,7 +243,7 @@ class Derivatives:
 
     def __init__(self, m: TracedMechanism, outputs: Sequence[Node]) -> None:
         self.m = m
-        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "s": m.s, "y": _row(outputs)}
+        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "s": m.s, "y": object_vector(outputs)}
         self.ends = np.cumsum([0, *(len(b) for b in self.blocks.values())])
         nodes = [x for b in self.blocks.values() for x in b]
         self.nodes = nodes
@@ -283,7 +272,7 @@ class Derivatives:
 
     def _sorted(self, found: list[Any]) -> Perturbed:
         rows = len(self.nodes)
-        value = self._parted(_row(found[:rows]))
+        value = self._parted(object_vector(found[:rows]))
         at, by = rows, dict[str, np.ndarray]()
         for k in BY:
             count = len(self.columns[k])
@@ -293,18 +282,12 @@ class Derivatives:
                 at += rows
             by |= {f"{name}{k}": part for name, part in self._parted(J).items()}
         nv, nq = len(self.m.x.v), len(self.m.x.q)
-        N = _row(found[at : at + nv * nv]).reshape(nv, nv)
-        T = _row(found[at + nv * nv :]).reshape(nq, nv)
+        N = object_vector(found[at : at + nv * nv]).reshape(nv, nv)
+        T = object_vector(found[at + nv * nv :]).reshape(nq, nv)
         return Perturbed(value, by, N, T)
 
     def _parted(self, J: np.ndarray) -> dict[str, np.ndarray]:
         return {k: J[i:j] for k, i, j in zip(self.blocks, self.ends[:-1], self.ends[1:], strict=True)}
-
-
-def _row(x: Sequence[Any]) -> np.ndarray:
-    out = zero_objects(len(x))
-    out[:] = list(x)
-    return out
 
 
 def _turning(m: TracedMechanism) -> np.ndarray:

@@ -186,8 +186,9 @@ def reference_point(m: TracedMechanism) -> OperatingPoint:
                 )
             if value is not None:
                 at[name].set(point, value)
-    for k, d, law, rate in m.laws:
-        q[k], v[d] = substitute([law, rate], [(m.x.t, 0.0)])
+    for k, b in enumerate(n.prescribed.values(), len(n.rows)):
+        at_q, at_v = int(m.x.system.tree.q[b]), int(m.x.system.tree.v[b])
+        q[at_q], v[at_v] = substitute([-m.g[k], m.x.nu[k]], [(m.x.t, 0.0), (m.x.q[at_q], 0.0)])
     return point
 
 
