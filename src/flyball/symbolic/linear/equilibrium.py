@@ -13,21 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...derivatives.force_balance import usual_states
+from ...derivatives.linear_reduction import product
 from ...derivatives.reduced_equations import gap_lengths
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute
-from ...expression_graph.graph import SYMBOL, Node, zero_objects
+from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute, symbols_of
+from ...expression_graph.graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, SYMBOL, Node, zero_objects
 from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from ..explicit.linear_systems import DependentEquations, nominal_value, nominal_values, solve_equations
 from .derivatives import Derivatives, Perturbed, TracedMechanism
-from .elimination import (
-    DependentEquations,
-    identically_zero,
-    matrix_product,
-    nominal_value,
-    nominal_values,
-    solve_equations,
-    values_and_sizes,
-)
 from .operating_point import OperatingPoint
 from .reduction import Freedoms, reduce_linear, scaled_rows, with_bases_of
 
@@ -80,7 +73,7 @@ def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.nd
     r = zero_objects(len(m.r), 1)
     left = substitute([*m.r, *m.s], [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
     r[:, 0] = left[: len(r)]
-    found = substitute([*matrix_product(f.Zv.T, r)[:, 0], *left[len(r) :]], [(s, 0.0) for s in m.added])
+    found = substitute([*product(f.Zv.T, r)[:, 0], *left[len(r) :]], [(s, 0.0) for s in m.added])
     return not_identically_zero(found)
 
 
@@ -88,6 +81,43 @@ def not_identically_zero(nodes: Sequence[Any]) -> list[Node]:
     """Expressions that do not vanish identically; constants are rounding, or refused."""
     told = [x for x, none in zip(nodes, identically_zero(nodes), strict=True) if isinstance(x, Node) and not none]
     return [x for x in told if not x.known]
+
+
+ROUNDING_TOLERANCE = 1e-12  # values below this part of the terms are rounding
+RANDOM_DRAWS = 3
+
+
+def values_and_sizes(nodes: Sequence[Any], values: Mapping[str, float] | None = None) -> list[tuple[float, float]]:
+    """(value, sum of the absolute values of all terms) of expressions, with the parameters' own or other values."""
+    told = values or {}
+    found: dict[int, tuple[float, float]] = {}
+    for x in nodes_in_order(nodes):
+        a = [found[k.index] for k in x.args]
+        own = [v for v, _ in a]
+        if x.op == NUMBER:
+            value = x.value
+        elif x.op == SYMBOL:
+            value = told.get(x.data.name, x.value)
+        else:
+            value = float(x.data.python(*own) if x.op == CALL else OPERATIONS[x.op](*own))
+        if x.op in (ADD, MULTIPLY):
+            size = float(OPERATIONS[x.op](*(s for _, s in a)))
+        elif x.op == DIVIDE:
+            size = a[0][1] / abs(own[1]) if own[1] else float("inf")
+        else:
+            size = 1.0 if x.op in ("sin", "cos") else abs(value)
+        found[x.index] = (value, size)
+    return [found[x.index] if isinstance(x, Node) else (float(x), abs(float(x))) for x in nodes]
+
+
+def identically_zero(nodes: Sequence[Any]) -> list[bool]:
+    """Which expressions are identically zero, tested with random parameter values near their own."""
+    rng = np.random.default_rng(0)
+    out = np.ones(len(nodes), bool)
+    for _ in range(RANDOM_DRAWS):
+        told = {s.data.name: (s.value or 0.1) * float(rng.uniform(0.7, 1.3)) for s in symbols_of(nodes)}
+        out &= np.array([abs(x) <= ROUNDING_TOLERANCE * size for x, size in values_and_sizes(nodes, told)], bool)
+    return [bool(x) for x in out]
 
 
 def refuse_unbalanced(m: TracedMechanism, f: Freedoms, p: Perturbed, at: dict[str, float]) -> None:

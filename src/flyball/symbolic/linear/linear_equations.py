@@ -19,9 +19,9 @@ from ...results.equilibrium import Equilibrium
 from ...results.result import Result
 from ...results.wording import with_unit
 from ...tables.coordinate_choice import spanning_joints
+from ..explicit.linear_systems import nominal_value
 from ..expressions import Expressions, SymbolTable
 from .derivatives import Derivatives, Perturbed, TracedMechanism, refuse_unknown, trace_mechanism
-from .elimination import nominal_value
 from .equilibrium import (
     Validity,
     balancing_multipliers,

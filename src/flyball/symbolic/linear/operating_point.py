@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...assembly.compiled_mechanism import compile_mechanism
+from ...derivatives.linear_reduction import product
 from ...errors import ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, substitute
 from ...expression_graph.graph import Node, zero_objects
@@ -22,8 +23,8 @@ from ...model.messages import listing, suggest
 from ...numerics.rank import RANK_TOLERANCE
 from ...tables.forest import tree_joint_steps
 from ...tables.law_inputs import initial_controller_states
+from ..explicit.linear_systems import is_zero, nominal_value, nominal_values, solve_equations
 from .derivatives import TracedMechanism
-from .elimination import is_zero, matrix_product, nominal_value, nominal_values, solve_equations
 
 CONSISTENCY_TOLERANCE = 1e-9  # relative difference below which velocities are equal
 
@@ -61,7 +62,7 @@ def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[
     rows, columns = _independent(nominal_values(A) * m.scale), _independent(nominal_values(A).T)
     v = zero_objects(nv, 1)
     v[columns] = solve_equations(A[np.ix_(rows, columns)], right[rows])
-    missed = nominal_values(matrix_product(A, v)) - nominal_values(right)
+    missed = nominal_values(product(A, v)) - nominal_values(right)
     if np.abs(missed).max() > CONSISTENCY_TOLERANCE * np.abs(nominal_values(right)).max():
         raise ModelError(
             f"the joints of {m.model.name!r} do not allow the given velocities of its bodies; give "

@@ -21,13 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...errors import ModelError, import_optional
 from ...expression_graph.evaluation import evaluate
 from ...expression_graph.graph import Node, zero_objects
 from ...model.messages import listing, suggest
 from ...results.wording import with_unit
 from .derivatives import Perturbed, TracedMechanism
-from .elimination import is_zero, matrix_product
 from .equilibrium import Validity
 from .polynomials import PolynomialRing, determinant
 from .reduction import Freedoms, replaced
@@ -86,7 +86,7 @@ def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechani
         """Coefficients of (a s + v) (s - N) + x, followed by columns of states, multipliers and inputs."""
         z, lam, w = others
         more = np.hstack([z, lam[:, l], w])
-        first, zeroth = _less(v, matrix_product(a, p.N)), _less(x, matrix_product(v, p.N))
+        first, zeroth = v - product(a, p.N), x - product(v, p.N)
         none = zero_objects(*more.shape)
         return [np.hstack([X[:, independent], last]) for X, last in ((zeroth, more), (first, none), (a, none))]
 
@@ -94,14 +94,6 @@ def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechani
     rates = len(independent) + np.arange(nz)
     P[1][rates, rates] = P[1][rates, rates] - 1.0
     return [replaced(X, [(s, 0.0) for s in m.added]) for X in (*P, *powers(*(by[f"y{c}"] for c in "avxzlw")))]
-
-
-def _less(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    out = A.copy()
-    for at, x in np.ndenumerate(B):
-        if not is_zero(x):
-            out[at] = out[at] - x
-    return out
 
 
 @dataclass
