@@ -44,15 +44,21 @@ def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 class FreeMotions(Protocol):
     """Motions that the constraints allow.
 
-    ``Z`` (nv, f) and ``Zv`` (nv, fv) are bases of the changes of positions and velocities, with the identity in the
-    rows ``chosen`` and ``chosen_v``. ``on_positions`` says which constraints are on positions.
+    ``chosen`` and ``chosen_v`` are the free coordinates and velocities; ``on_positions`` says which constraints are on
+    positions.
     """
 
-    Z: np.ndarray
-    Zv: np.ndarray
     chosen: np.ndarray
     chosen_v: np.ndarray
     on_positions: np.ndarray
+
+    @property
+    def Z(self) -> np.ndarray:
+        """Basis of the changes of positions, (nv, f), with the identity in the rows ``chosen``."""
+
+    @property
+    def Zv(self) -> np.ndarray:
+        """Basis of the changes of velocities, (nv, fv), with the identity in the rows ``chosen_v``."""
 
     def dependent_positions(self, right: np.ndarray) -> np.ndarray:
         """Changes x with G x + right = 0 that change no chosen coordinate; G: constraints on positions."""

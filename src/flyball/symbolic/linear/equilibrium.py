@@ -7,7 +7,7 @@ the parameters. A motion with constant rates must look the same at later times.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, 
 from ..explicit.linear_systems import DependentEquations, nominal_value, nominal_values, solve_equations
 from .derivatives import Derivatives, Perturbed, TracedMechanism
 from .operating_point import OperatingPoint
-from .reduction import Freedoms, reduce_linear, scaled_rows, with_bases_of
+from .reduction import Freedoms, reduce_linear, scaled_rows
 
 # Largest residual at an equilibrium, relative to the cancelling terms and to the largest force.
 BALANCE_TOLERANCE = 1e-6
@@ -324,7 +324,7 @@ def _matrix(m: TracedMechanism, d: Derivatives, f: Freedoms, at: dict[str, float
     """Matrix A in numbers, in the same coordinates."""
     p = d.near(at)
     n = f.Z.shape[1] + f.Zv.shape[1]
-    return nominal_values(reduce_linear(m, p, with_bases_of(f, p)).rate[:, :n])
+    return nominal_values(reduce_linear(m, p, replace(f, G=p.by["nv"])).rate[:, :n])
 
 
 def _moved(m: TracedMechanism, at: dict[str, float], v: np.ndarray, h: float) -> None:

@@ -7,7 +7,8 @@ parameters, with the pivoting of `Mechanism.linearize`; the basis consists of ex
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,9 +39,8 @@ class Freedoms:
     ----------
     G : ndarray (rows, nv)
         All constraints, along the velocities.
-    Z, Zv : ndarray (nv, f), (nv, fv)
-        Bases of the changes of positions and velocities that the constraints allow, with the identity in the rows
-        ``chosen`` and ``chosen_v``.
+    chosen, chosen_v : ndarray of int
+        Free coordinates, and free velocities.
     rows, rows_v : ndarray of int
         Independent constraints on positions, and among all constraints; the others follow from these.
     held : ndarray of int
@@ -50,14 +50,22 @@ class Freedoms:
     """
 
     G: np.ndarray
-    Z: np.ndarray
-    Zv: np.ndarray
     chosen: np.ndarray
     chosen_v: np.ndarray
     rows: np.ndarray
     rows_v: np.ndarray
     held: np.ndarray
     on_positions: np.ndarray
+
+    @cached_property
+    def Z(self) -> np.ndarray:
+        """Basis of the changes of positions, (nv, f), with the identity in the rows ``chosen``."""
+        return self._basis(self.rows, self.chosen)
+
+    @cached_property
+    def Zv(self) -> np.ndarray:
+        """Basis of the changes of velocities, (nv, fv), with the identity in the rows ``chosen_v``."""
+        return self.Z if self.chosen_v is self.chosen else self._basis(self.rows_v, self.chosen_v)
 
     def dependent_positions(self, right: np.ndarray) -> np.ndarray:
         """See `FreeMotions`."""
@@ -87,14 +95,9 @@ class Freedoms:
             out[others] = -solve_equations(self.G[np.ix_(rows, others)], right[rows])
         return out
 
-    def with_bases(self) -> Freedoms:
-        """The bases of the same coordinates and rows, from G."""
+    def _basis(self, rows: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         identity = np.eye(self.G.shape[1]).astype(object)
-        self.Z = identity[:, self.chosen] + self._dependent(self.rows, self.chosen, self.G[:, self.chosen])
-        self.Zv = self.Z
-        if not self.on_positions.all():
-            self.Zv = identity[:, self.chosen_v] + self.dependent_velocities(self.G[:, self.chosen_v])
-        return self
+        return identity[:, chosen] + self._dependent(rows, chosen, self.G[:, chosen])
 
 
 def find_freedoms(m: TracedMechanism, p: Perturbed, requested: Sequence[str] = ()) -> Freedoms:
@@ -105,19 +108,14 @@ def find_freedoms(m: TracedMechanism, p: Perturbed, requested: Sequence[str] = (
     ModelError
         If the requested coordinates do not determine the others.
     """
-    G, none = p.by["nv"], zero_objects(0)
+    G = p.by["nv"]
     held = _massless_velocities(p)
     which = np.flatnonzero(m.holonomic)
     chosen, rows = _chosen(m, G, which, held, _indices(m, requested))
     chosen_v, rows_v = chosen, rows
     if len(which) < len(G):
         chosen_v, rows_v = _chosen(m, G, np.arange(len(G)), held, None)
-    return Freedoms(G, none, none, chosen, chosen_v, rows, rows_v, held, m.holonomic).with_bases()
-
-
-def with_bases_of(f: Freedoms, p: Perturbed) -> Freedoms:
-    """The same free coordinates and rows, with the bases of another state."""
-    return replace(f, G=p.by["nv"]).with_bases()
+    return Freedoms(G, chosen, chosen_v, rows, rows_v, held, m.holonomic)
 
 
 def _indices(m: TracedMechanism, requested: Sequence[str]) -> np.ndarray | None:
