@@ -7,7 +7,7 @@ the rounding errors of coefficients (Parlett and Reinsch 1969; Watkins 2006); th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -257,8 +257,9 @@ def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None
         a *= NEARBY_STEP / np.abs(a / f.scale).max()
         G = _nearby_jacobian(c, x.t, x.q, a, f.scale)
         if G is not None and constraint_rank(G, f.scale) > here:
-            names = _dependent_elements(f, G, c)
-            raise singular_position_error(x.t, names)
+            of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
+            now, there = (normalised_rows(rows, f.scale) for rows in (f.holonomic, G))
+            raise singular_position_error(x.t, lost_constraints(now, there, of))
 
 
 def singular_position_error(t: float, names: tuple[str, ...]) -> SingularityError:
@@ -298,15 +299,14 @@ def _nearby_jacobian(
         c.z = z
 
 
-def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism) -> tuple[str, ...]:
-    """Elements whose rows take part in dependencies that nearby positions do not have."""
-    here, there = (
-        fundamental_subspaces(normalised_rows(f.holonomic, f.scale)).dependencies,
-        fundamental_subspaces(normalised_rows(G, f.scale)).span,
-    )
-    part = np.abs(here @ (here.T @ there)).max(axis=1)
-    of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
-    return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))
+PARTICIPATION = 1e-3  # elements whose part in a dependency is smaller do not take part in it
+
+
+def lost_constraints(here: np.ndarray, there: np.ndarray, elements: Sequence[str]) -> tuple[str, ...]:
+    """Elements whose normalised rows take part in dependencies that nearby positions do not have."""
+    lost, span = fundamental_subspaces(here).dependencies, fundamental_subspaces(there).span
+    part = np.abs(lost @ (lost.T @ span)).max(axis=1)
+    return tuple(dict.fromkeys(name for name, x in zip(elements, part, strict=True) if x > PARTICIPATION))
 
 
 def static_equations(e: EquationDerivatives) -> EquationDerivatives:

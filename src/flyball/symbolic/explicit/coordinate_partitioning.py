@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...derivatives.reduced_equations import gap_lengths, normalised_rows
+from ...derivatives.reduced_equations import gap_lengths, lost_constraints, normalised_rows
 from ...errors import ModelError, SingularityError
 from ...expression_graph.evaluation import evaluate, evaluate_array
 from ...expression_graph.tracing import TracedEquations
 from ...model.model import listing, suggest
-from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from ...numerics.rank import RANK_TOLERANCE, null_space, rank
 from ...tables.structure_definition import Structure, velocity_names
 from .zero_test import Probe
 
@@ -210,12 +210,14 @@ class ConstraintValues:
         which = np.flatnonzero(self.c.holonomic)
         if not f.chosen or not len(which):
             return
-        here = rank(normalised_rows(self.G[which], self.scale))
+        here = normalised_rows(self.G[which], self.scale)
         rng = np.random.default_rng(0)
         for _ in range(2):
             G = self._nearby(rng, which)
-            if G is not None and rank(normalised_rows(G, self.scale)) > here:
-                raise singular_start_error(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
+            there = here if G is None else normalised_rows(G, self.scale)
+            if rank(there) > rank(here):
+                lost = lost_constraints(here, there, [self.c.elements[k] for k in which])
+                raise singular_start_error(lost, self.values[self.x.t.data.name])
 
     def _nearby(self, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
         """Jacobian of the position constraints at the assembled position near a random step; None if assembly fails."""
@@ -242,13 +244,3 @@ class ConstraintValues:
             if len(q) > len(v):
                 moved /= np.linalg.norm(moved)
             values |= {names[k]: float(y) for k, y in zip(q, moved, strict=True)}
-
-    def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
-        """Elements whose rows take part in dependencies that nearby positions do not have."""
-        y, span = (
-            fundamental_subspaces(normalised_rows(here, self.scale)).dependencies,
-            fundamental_subspaces(normalised_rows(there, self.scale)).span,
-        )
-        part = np.abs(y @ (y.T @ span)).max(axis=1)
-        found = [self.c.elements[k] for k, p in zip(which, part, strict=True) if p > 1e-3]
-        return list(dict.fromkeys(found))

@@ -14,11 +14,11 @@ import numpy as np
 
 from ...derivatives.force_balance import usual_states
 from ...derivatives.linear_reduction import product
-from ...derivatives.reduced_equations import gap_lengths
+from ...derivatives.reduced_equations import gap_lengths, lost_constraints
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute, symbols_of
 from ...expression_graph.graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, SYMBOL, Node, zero_objects
-from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from ...numerics.rank import RANK_TOLERANCE, null_space, rank
 from ..explicit.linear_systems import DependentEquations, nominal_value, nominal_values, solve_equations
 from .derivatives import Derivatives, Perturbed, TracedMechanism
 from .operating_point import OperatingPoint
@@ -357,6 +357,8 @@ def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) ->
     if not len(which):
         return
     now = _rows(m, G, here)[which]
+    s = m.values.structure
+    of = [*(r.element.name for r in s.rows if r.holonomic), *s.prescribed]
     N = null_space(now)
     rng = np.random.default_rng(0)
     for _ in range(2 if N.shape[1] else 0):
@@ -364,8 +366,9 @@ def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) ->
         step *= NEARBY_STEP * m.values.length / np.abs(step / m.scale).max()
         there = _nearby(m, G, dict(here), step, which)
         if there is not None and rank(there) > rank(now):
+            lost = ", ".join(lost_constraints(now, there, of))
             raise ModelError(
-                f"{m.model.name!r} is in a singular position there: the constraints of {_lost(m, now, there, which)} "
+                f"{m.model.name!r} is in a singular position there: the constraints of {lost} "
                 f"depend on each other at this point and not nearby, so that there are no linear equations; give "
                 f"another point"
             )
@@ -390,12 +393,3 @@ def _nearby(
             return _rows(m, G, at)[which]
         step = m.scale * np.linalg.lstsq(scaled_rows(A, m.scale), -g, rcond=RANK_TOLERANCE)[0]
     return None
-
-
-def _lost(m: TracedMechanism, now: np.ndarray, there: np.ndarray, which: np.ndarray) -> str:
-    """Elements whose rows take part in dependencies that nearby positions do not have."""
-    here, span = fundamental_subspaces(now).dependencies, fundamental_subspaces(there).span
-    part = np.abs(here @ (here.T @ span)).max(axis=1)
-    s = m.values.structure
-    of = [*(r.element.name for r in s.rows), *s.prescribed]
-    return ", ".join(dict.fromkeys(of[k] for k, x in zip(which, part, strict=True) if x > 1e-3))
