@@ -1140,7 +1140,7 @@ class SymbolicMethods(Model):
         Raises
         ------
         ModelError
-            If the mechanism has contacts, or a name does not exist.
+            If the mechanism has contacts or sampled controllers, or a name does not exist.
         """
         from .symbolic.derivation import symbolic
         from .symbolic.equations import SymbolicOptions
