@@ -226,14 +226,14 @@ def consistent_state(
     plain = compile_mechanism(model, parameters=parameters)
     x = plain.values
     model, key = x.structure.model, float(t).hex()
-    home = x if _has_own_poses(plain) else x.unforced
+    home = x if _poses_differ(plain) else x.unforced
     found = home.kept.get(
         "assembled", key, MAX_CACHED_ASSEMBLIES, lambda: _assemble_anew(model, plain, t, parameters, explain).again()
     )
     return found.again() if found.compiled.values is x else found.of(plain)
 
 
-def _has_own_poses(c: CompiledMechanism) -> bool:
+def _poses_differ(c: CompiledMechanism) -> bool:
     """Return whether reference angles and curve positions differ from those of values that differ in forces only."""
     x, n = c.values, len(c.structure.controls)
     if (other := x.alike) is None:

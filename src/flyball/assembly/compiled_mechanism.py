@@ -187,13 +187,13 @@ class CompiledMechanism:
         """
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        same = other.drawn(q) and self.values.given is other.values.given
+        same = other.is_reference_configuration(q) and self.values.given is other.values.given
         bodies = other.moving(t, q, v) if v.any() or not same else {}
         own = self.values.q.copy() if same else positions(self.values, bodies, hints)
         self.at(t, own, np.zeros(self.structure.nv))
         return own, joint_velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
 
-    def drawn(self, q: np.ndarray) -> bool:
+    def is_reference_configuration(self, q: np.ndarray) -> bool:
         """Return whether q is the reference configuration, with its angles."""
         return np.array_equal(q, self.values.q) and np.array_equal(self.z, initial_hints(self.values))
 

@@ -93,7 +93,7 @@ class LinkedProcedures:
             if not x.moving:
                 reads[x.index] = self._constant(x)
                 continue
-            found = None if _is_multiple(x) else self._left(x, before)
+            found = None if _is_multiple(x) else self._stored_place(x, before)
             if found is not None:
                 reads[x.index] = found
                 continue
@@ -114,7 +114,7 @@ class LinkedProcedures:
             self.hoisted.append(x)
         return self.slots[x.index]
 
-    def _left(self, x: Node, before: list[Procedure]) -> Place | None:
+    def _stored_place(self, x: Node, before: list[Procedure]) -> Place | None:
         for p in before:
             here = x.index in self.computed[p.name] or (x.op == SYMBOL and x.index in p.reads)
             if (

@@ -132,7 +132,7 @@ class FreeCoordinates:
         return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=RANK_TOLERANCE)[0]
 
     @staticmethod
-    def unseen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
+    def without_chosen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
         """Add motions of the basis to x so that no chosen coordinate changes."""
         return x - basis @ (left @ x)
 
@@ -454,14 +454,14 @@ class TurningFrame:
         Generator of the turning of co-moving changes of positions and velocities.
     N : ndarray (nv, nv) [1/s]
         (rate of a change of position) = (change of velocity) + N (change of position).
-    told : str
+    description : str
         Description for messages and reports; empty at rest.
     """
 
     turning: np.ndarray
     H: np.ndarray
     N: np.ndarray
-    told: str = ""
+    description: str = ""
 
 
 @dataclass
@@ -581,9 +581,9 @@ def _constrained_motions(
     none, states = np.zeros_like(w.r), np.zeros((nv, e.nz))
     rates = np.zeros((len(f.rows), w.g.shape[1]))
     rates[f.on_positions] = w.g
-    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.left)
+    X = f.without_chosen(-f.solve(w.g, f.holonomic), f.Z, f.left)
     P, U, U1 = (
-        f.unseen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
+        f.without_chosen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
         for b in (V @ f.Z, V @ X + w.n, rates)
     )
     x = np.hstack([f.Z, np.zeros_like(f.Zv), states, X, none, none])

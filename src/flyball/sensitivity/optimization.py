@@ -107,10 +107,10 @@ def optimize(model: Model, o: OptimizeOptions) -> Optimum:
         try:
             return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)
         except KeyboardInterrupt as stopped:
-            left = search.left()
-            if left is None:
+            interruption = search.interruption()
+            if interruption is None:
                 raise
-            raise left from stopped
+            raise interruption from stopped
 
 
 class ParameterSearch:
@@ -172,7 +172,7 @@ class ParameterSearch:
         if self._best is None or cost < self._best[0]:
             self._best = cost, x.copy(), self.at(x)
 
-    def left(self) -> Interrupted | None:
+    def interruption(self) -> Interrupted | None:
         """The error for the user's interrupt, with the best parameters so far; None if there are none."""
         if self._best is None:
             return None
@@ -192,15 +192,15 @@ class ParameterSearch:
         def split(r: np.ndarray) -> np.ndarray:
             return r if np.isrealobj(r) else np.concatenate([r.real, r.imag])
 
-        def left(found: Any) -> np.ndarray:
+        def residuals(found: Any) -> np.ndarray:
             return split((np.asarray(weights) * (found.values - goal)).ravel())
 
-        begin = left(first)
+        begin = residuals(first)
         size = float(np.abs(begin).max(initial=0.0)) or 1.0
 
         def residual(x: np.ndarray) -> np.ndarray:
             try:
-                r = left(self.at(x))
+                r = residuals(self.at(x))
             except AnalysisError:
                 return np.full(len(begin), FAILURE_COST * size)
             self._weighed(x, 0.5 * float(r @ r))

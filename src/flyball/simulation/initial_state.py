@@ -232,7 +232,7 @@ class InitialState:
         return InitialState(base, a, self.y.copy(), self.coordinates, dict(self.wound), part=part)
 
     @property
-    def carried(self) -> Mapping[str, Any]:
+    def earlier_data(self) -> Mapping[str, Any]:
         """Data from the segment before this one; empty if there is none."""
         return self.before.carried if self.part.later and self.before is not None else {}
 
@@ -411,7 +411,7 @@ def add_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembl
 
 def _whole_turns(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
     s = a.compiled.structure
-    if not s.tree or not s.model.planar or (base.compiled.drawn(base.q) and a.compiled.drawn(y[: s.nq])):
+    if not s.tree or not s.model.planar or (base.compiled.is_reference_configuration(base.q) and a.compiled.is_reference_configuration(y[: s.nq])):
         return {}
     q, c = y[: s.nq], a.compiled
     c.at(a.t, q, np.zeros(s.nv))

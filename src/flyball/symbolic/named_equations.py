@@ -222,7 +222,7 @@ class ClosedFormAngles:
         here, there = (self._heading(k) + self._since[int(S.frame_body[k])] for k in (F, M))
         if isinstance(owner, Body | Frame):
             return there
-        drawn_here, drawn_there = (self._heading(k) + self._drawn(int(S.frame_body[k])) for k in (F, M))
+        drawn_here, drawn_there = (self._heading(k) + self._reference_angle(int(S.frame_body[k])) for k in (F, M))
         whole = math.floor((_real(drawn_there) - _real(drawn_here)) / FULL_TURN + 0.5)
         return there - here - FULL_TURN * whole
 
@@ -242,7 +242,7 @@ class ClosedFormAngles:
                 out[b] = x.bodies[name].angle + since[b]
         return out
 
-    def _drawn(self, b: int) -> Any:
+    def _reference_angle(self, b: int) -> Any:
         names = {at: name for name, at in self.x.structure.place.items()}
         return 0.0 if b < 0 else self.x.bodies[names[b]].angle
 

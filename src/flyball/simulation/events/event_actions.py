@@ -270,7 +270,7 @@ class EventActions:
     first: int = 0
     tables: Values | None = None  # before
 
-    def told(self, labels: Sequence[str] = ()) -> None:
+    def record_events(self, labels: Sequence[str] = ()) -> None:
         """Record the events with what was done; jumps that only the events caused (locks, impulses) are included in the
         record.
 
