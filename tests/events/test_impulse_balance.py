@@ -135,7 +135,9 @@ MADE = [sliding_box, tumbling_box, driven_piston, geared, racked, following, rou
 def momentum(moment, body, tables):
     """Of a body, about its centre of mass, world axes, (6,)."""
     S, b = tables.system, tables.structure.place[body]
-    _, R, w, v, _, _ = (np.array([float(np.ravel(x)[0]) for x in part]) for part in moment.single_time_result.records.body(b))
+    _, R, w, v, _, _ = (
+        np.array([float(np.ravel(x)[0]) for x in part]) for part in moment.single_time_result.records.body(b)
+    )
     R = R.reshape(3, 3)
     return np.r_[S.bodies.mass[b] * v, R @ S.bodies.inertia[b].reshape(3, 3) @ R.T @ w]
 

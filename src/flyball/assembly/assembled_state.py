@@ -227,7 +227,7 @@ def consistent_state(
     x = plain.values
     model, key = x.structure.model, float(t).hex()
     home = x if _poses_differ(plain) else x.unforced
-    found = home.kept.get(
+    found = home.cache.get(
         "assembled", key, MAX_CACHED_ASSEMBLIES, lambda: _assemble_anew(model, plain, t, parameters, explain).again()
     )
     return found.again() if found.compiled.values is x else found.of(plain)
@@ -238,7 +238,7 @@ def _poses_differ(c: CompiledMechanism) -> bool:
     x, n = c.values, len(c.structure.controls)
     if (other := x.alike) is None:
         return True
-    return not np.array_equal(c.z[n:], other.kept.get("places", None, 1, lambda: initial_hints(other))[n:])
+    return not np.array_equal(c.z[n:], other.cache.get("places", None, 1, lambda: initial_hints(other))[n:])
 
 
 def _assemble_anew(
@@ -410,7 +410,7 @@ def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[s
     out = {}
     model = model.snapshot()
     tables = {x.name: x for x in model.tables}
-    laws = model.kept.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
+    laws = model.cache.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
     for d in model.drivers:
         law = laws[d.name]
         if law.names <= {"t", *env}:

@@ -110,8 +110,8 @@ class FreeCoordinates:
     chosen: np.ndarray
     chosen_v: np.ndarray
     scale: np.ndarray
-    left: np.ndarray  # (f, nv): selects the changes of the chosen coordinates
-    left_v: np.ndarray  # the same for velocities
+    position_selector: np.ndarray  # (f, nv): selects the changes of the chosen coordinates
+    velocity_selector: np.ndarray  # the same for velocities
     on_positions: np.ndarray  # (m,): True for constraints on positions
 
     @property
@@ -123,7 +123,12 @@ class FreeCoordinates:
         """The same motions turned by T (nv, nv), with the constraints of a later time."""
         other = free_coordinates(later_equations)
         back = np.linalg.inv(T)
-        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ back, "left_v": self.left_v @ back}
+        bases = {
+            "Z": T @ self.Z,
+            "Zv": T @ self.Zv,
+            "position_selector": self.position_selector @ back,
+            "velocity_selector": self.velocity_selector @ back,
+        }
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
     def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
@@ -539,7 +544,7 @@ def reduced_equations(
     w = w or InputTerms(*(np.zeros((n, 0)) for n in (nv, len(f.holonomic), len(f.rows), e.nz)))
     none = np.zeros_like(w.r)
     x, u, P, by_inputs = _constrained_motions(e, f, w)
-    a_dot = f.left @ (u + (N - H) @ x)
+    a_dot = f.position_selector @ (u + (N - H) @ x)
     known = P @ a_dot + np.hstack([np.zeros((nv, free)), none, *by_inputs])
     acting = np.hstack([np.zeros((nv, free - e.nz)), e.by_state[r], w.r, none, none])
     others = (M @ H + D) @ u + K @ x + acting
@@ -551,7 +556,7 @@ def reduced_equations(
     size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
     size[:, free - e.nz : free] += abs(e.by_state[r])
     z, laws, law_terms = _controller_equations(e, x, u, w)
-    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, law_terms, Y, M)
+    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.position_selector) @ (abs(u) + abs(N - H) @ abs(x)), size, law_terms, Y, M)
     forces, rates = Y.T @ (M @ known + others), np.where(e.sampled[:, None], 0.0, laws)
     try:
         doubt = remove_rounding(terms, a_dot, forces, rates, e, f)
@@ -581,9 +586,9 @@ def _constrained_motions(
     none, states = np.zeros_like(w.r), np.zeros((nv, e.nz))
     rates = np.zeros((len(f.rows), w.g.shape[1]))
     rates[f.on_positions] = w.g
-    X = f.without_chosen(-f.solve(w.g, f.holonomic), f.Z, f.left)
+    X = f.without_chosen(-f.solve(w.g, f.holonomic), f.Z, f.position_selector)
     P, U, U1 = (
-        f.without_chosen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
+        f.without_chosen(-f.solve(b), f.Zv, f.velocity_selector) if b.any() else np.zeros((nv, b.shape[1]))
         for b in (V @ f.Z, V @ X + w.n, rates)
     )
     x = np.hstack([f.Z, np.zeros_like(f.Zv), states, X, none, none])

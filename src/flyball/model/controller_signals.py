@@ -184,7 +184,7 @@ def controller_states(model: Model) -> list[ConnectedState]:
         If signals of sampled controllers depend on each other in a loop.
     """
     return (
-        model.kept.get("wired", None, 1, lambda: _controller_states(model))
+        model.cache.get("wired", None, 1, lambda: _controller_states(model))
         if model.frozen
         else _controller_states(model)
     )
@@ -249,7 +249,7 @@ def controller_names(model: Model, e: Controller) -> list[str]:
 
 
 def _signal_graph(model: Model) -> _SignalGraph:
-    return model.kept.get("wiring", None, 1, lambda: _SignalGraph(model)) if model.frozen else _SignalGraph(model)
+    return model.cache.get("wiring", None, 1, lambda: _SignalGraph(model)) if model.frozen else _SignalGraph(model)
 
 
 class _SignalGraph:

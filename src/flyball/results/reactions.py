@@ -274,7 +274,11 @@ class EventImpulses(Mapping):
         if name not in self._names:
             raise KeyError(name)
         blows = applied_by_event(self._blows)
-        return applied_impulse_value(blows[name], self._structure) if name in blows else self._reactions.event_impulse(name)
+        return (
+            applied_impulse_value(blows[name], self._structure)
+            if name in blows
+            else self._reactions.event_impulse(name)
+        )
 
     @property
     def _structure(self) -> Structure:

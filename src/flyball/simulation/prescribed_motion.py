@@ -47,7 +47,7 @@ def leaves_no_freedom(start: InitialState) -> bool:
         return False
     a = start.base
     x, key = a.compiled.values, (float(a.t).hex(), a.y.tobytes())
-    return x.kept.get("held", key, MOST_STARTS, lambda: _rank_of_rows(a) == s.nv)
+    return x.cache.get("held", key, MOST_STARTS, lambda: _rank_of_rows(a) == s.nv)
 
 
 def _rank_of_rows(a: Assembly) -> int:

@@ -286,7 +286,7 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> Non
     real.energy_size = energy_scale(base, float(real.span))
     rate = c.array("options").rate = characteristic_rate_within(c.values.system, float(real.span))
     nq, nv = c.structure.nq, c.structure.nv
-    clock.y[ex.UNIT] = c.values.kept.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
+    clock.y[ex.UNIT] = c.values.cache.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
     clock.y[ex.UNIT, nq : nq + nv] *= rate
     loose = real.atol + real.rtol
     near = loose * min(1.0, loose / TIGHT_TOLERANCE)
@@ -315,7 +315,7 @@ def energy_scale(a: Assembly, span: float) -> float:
     energy.
     """
     x = a.compiled.values
-    weight = x.unforced.kept.get("weight", None, 1, lambda: _weight(x.system))
+    weight = x.unforced.cache.get("weight", None, 1, lambda: _weight(x.system))
     return rest_energy(weight, x.length, span) + a.compiled.kinetic_energy(a.v)
 
 

@@ -83,7 +83,7 @@ def mechanism_kind(s: Structure) -> tuple[str, float]:
     """Return a key shared by mechanisms that differ in numbers only, and the cost of an evaluation by the general
     engine [ns].
     """
-    return s.kept.get(
+    return s.cache.get(
         "kind", None, 1, lambda: (_structure_hash(s), EVALUATION_COST + COST_SHARE * right_hand_side_cost(s))
     )
 
@@ -190,7 +190,7 @@ class CodeSelection:
 
         The general engine either gets through, or leaves in the workspace the data for diagnosis.
         """
-        if self.c.made is None or clock.count.status not in FAILED_STATUS:
+        if self.c.generated is None or clock.count.status not in FAILED_STATUS:
             return False
         self.description += f"; general engine from t = {clock.real.t:.6g} s, where it failed"
         self.c.run_on_tables()
@@ -210,7 +210,7 @@ class CodeSelection:
         """End the use of generated code; the motion continues by a method that needs the general engine."""
         self.end()
         self.due = math.inf
-        if self.c.made is not None:
+        if self.c.generated is not None:
             self.c.run_on_tables()
 
     def end(self) -> None:
@@ -376,7 +376,11 @@ class StiffnessMonitor:
         if len(self.changes) <= MOST_REPORTED + 1:
             return "; ".join(self.changes)
         return "; ".join(
-            [*self.changes[:MOST_REPORTED], f"... {len(self.changes) - MOST_REPORTED - 1} more times ...", self.changes[-1]]
+            [
+                *self.changes[:MOST_REPORTED],
+                f"... {len(self.changes) - MOST_REPORTED - 1} more times ...",
+                self.changes[-1],
+            ]
         )
 
     def turned(self, clock: ex.StepState, to: str, why: str) -> None:

@@ -335,7 +335,7 @@ class NamedEquations:
     traced: TracedEquations  # with rows for prescribed coordinates, which the engine does not have
     # The engine's coordinates: those of `trace_equations` minus their reference values.
     user_q: list[Any]
-    drawn: list[Any]  # these reference values
+    reference_values: list[Any]  # these reference values
     vdot: list[Node]
     places: list[CurveParameter]
     cleaned: TurnElimination
@@ -482,7 +482,7 @@ def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -
     """Arrays of the engine as values by symbol names."""
     T = x.traced
     out: dict[str, Any] = {T.t.data.name: t}
-    for symbol, drawn, value in zip(T.q, x.drawn, q, strict=True):
+    for symbol, drawn, value in zip(T.q, x.reference_values, q, strict=True):
         out[symbol.data.name] = _python_number(value + drawn.real)
     return out | {symbol.data.name: _python_number(value) for symbol, value in zip(T.v, v, strict=True)}
 

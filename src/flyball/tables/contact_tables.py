@@ -228,9 +228,9 @@ def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) ->
         rows.add(k, e)
     own = _concatenated(rows.own, (0, 2, 3))
     surfaces = Surfaces(surface_pairs(model, given, g, rows.surfaces), own[:, 0].copy(), own[:, 1].copy())
-    apart = np.array(sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.apart), np.int64).reshape(
-        -1, 2
-    )
+    apart = np.array(
+        sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.excluded_pairs), np.int64
+    ).reshape(-1, 2)
     geometry = ct.Geometry(
         _concatenated(rows.ints, (0, 9), np.int64),
         _concatenated(rows.reals, (0, 24)),

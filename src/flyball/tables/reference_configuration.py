@@ -52,9 +52,9 @@ class Refresh:
         """Differences from existing tables of the same structure."""
         if base is None or base.given.since is not given.since:
             return cls()
-        stand_on = model.kept.get("stand on", None, 1, lambda: _dependents(model))
+        stand_on = model.cache.get("stand on", None, 1, lambda: _dependents(model))
         other = given.changed | base.given.changed
-        acting = model.kept.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
+        acting = model.cache.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
     def table(self, name: str, new: T, dtype: Any) -> T:
@@ -71,7 +71,7 @@ class Refresh:
         """Numbers of the rows of a table ("frames", "terms" or "forces") that are computed again."""
         if self.base is None:
             return range(len(getattr(s, table)))
-        of = s.kept.get("rows of elements", table, 3, lambda: _rows_of_elements(getattr(s, table)))
+        of = s.cache.get("rows of elements", table, 3, lambda: _rows_of_elements(getattr(s, table)))
         return sorted({k for name in self.names for k in of.get(name, ())})
 
     def asks(self, *elements: Any) -> bool:

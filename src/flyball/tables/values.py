@@ -75,7 +75,7 @@ class Values:
     given: ElementNumbers
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # frames in the reference configuration
-    kept: ResultCache = field(
+    cache: ResultCache = field(
         default_factory=ResultCache, init=False
     )  # initial states of motions; a changed copy has its own
     alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
@@ -142,19 +142,19 @@ def values_of(s: Structure, n: ElementNumbers, holds: Mapping[str, complex] | No
     """Numbers of a mechanism from the numbers of its elements."""
     if n.dtype is not float or (holds and number_type(holds.values()) is not float):
         return _fill(s, n, holds or {})
-    return s.kept.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
+    return s.cache.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
 
 
 def _fill(s: Structure, given: ElementNumbers, holds: Mapping[str, Any]) -> Values:
     """Compute all tables; where some exist already, only the rows that differ."""
     if holds:
         return _fill_all(s, given, holds, Refresh())
-    first = s.kept.known("filled first")
+    first = s.cache.known("filled first")
     new = Refresh.since(first, given, s.model)
     x = _fill_forces(s, given, new) if new.forces_only and given.dtype is float else None
     x = x or _fill_all(s, given, holds, new)
     if first is None and given.dtype is float:
-        s.kept.get("filled first", None, 1, lambda: x)
+        s.cache.get("filled first", None, 1, lambda: x)
     return x
 
 

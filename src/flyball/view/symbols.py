@@ -379,7 +379,10 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
     numbers = places.result.values.numbers[e.name]
     if kind == "link":
         yield _link_line(e, places, every)
-    elif kind == "universal" and np.abs(places.relative_origin(F, M)).max(initial=0.0) > 1e-6 * places.result.values.length:
+    elif (
+        kind == "universal"
+        and np.abs(places.relative_origin(F, M)).max(initial=0.0) > 1e-6 * places.result.values.length
+    ):
         yield _link_line(e, places, every)  # a massless link with a hinge at each end
         yield _joint_symbol(e, "revolute", F, M, places)
         yield _joint_symbol(e, "revolute", M, F, places)

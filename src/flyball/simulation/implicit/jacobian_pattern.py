@@ -292,7 +292,7 @@ def pressing_rows(S: System) -> np.ndarray:
 
 def jacobian_layout(s: Structure, S: System, index_3: bool = False) -> JacobianLayout:
     """Return the layout, cached for all runs of a structure."""
-    return s.kept.get("implicit", index_3, 2, lambda: JacobianLayout(s, S, index_3))
+    return s.cache.get("implicit", index_3, 2, lambda: JacobianLayout(s, S, index_3))
 
 
 def inverse_inertias(c: CompiledMechanism, t: float, y: np.ndarray) -> np.ndarray:
