@@ -128,7 +128,7 @@ def phases_or_none(phases: Sequence[Phase]) -> Phases | None:
 
 def split_by_parameters(result: Any) -> tuple[Any, ...]:
     """Return a result in pieces of constant parameters, if parameters changed; else none."""
-    cuts = result.phases.pieces() if result.phases is not None else []
+    cuts = result.phases.equal_parameter_phases() if result.phases is not None else []
     if len(cuts) < 2:
         return ()
     names = "t", "q", "v", "states", "vdot", "multipliers"
