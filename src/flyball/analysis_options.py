@@ -27,7 +27,7 @@ class Options:
     """Base class of the options of an analysis; times are converted to numbers [s], lists of names to tuples."""
 
     @classmethod
-    def asked(cls, given: Mapping[str, Any]) -> Self:
+    def from_arguments(cls, given: Mapping[str, Any]) -> Self:
         """Create options from ``locals()`` of the method."""
         return cls(**{name: given[name] for name in names_of(cls)})
 

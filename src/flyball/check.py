@@ -138,7 +138,7 @@ def check(model: Model) -> Report:
         joints=len(model.joints),
         forces=len(model.forces),
         drivers=len(model.drivers),
-        events={e.name: e.told for e in model.events},
+        events={e.name: e.description for e in model.events},
         gruebler=m.gruebler,
         freedoms=m.freedoms,
         redundant=m.redundant,

@@ -100,7 +100,7 @@ class MobilityMethods(Model):
         from .analysis_options import AssembleOptions
         from .assembly.assemble import assemble
 
-        o = AssembleOptions.asked(locals())
+        o = AssembleOptions.from_arguments(locals())
         return assemble(self, t=o.t, parameters=o.parameters)
 
     def check(self) -> Report:
@@ -152,7 +152,7 @@ class MobilityMethods(Model):
         from .analysis_options import MobilityOptions
         from .mobility.mobility import mobility
 
-        o = MobilityOptions.asked(locals())
+        o = MobilityOptions.from_arguments(locals())
         return mobility(self, t=o.t, parameters=o.parameters, inertia=o.inertia)
 
     def mass_properties(
@@ -178,7 +178,7 @@ class MobilityMethods(Model):
         """
         from .check import MassOptions, mass_properties
 
-        return mass_properties(self, MassOptions.asked(locals()))
+        return mass_properties(self, MassOptions.from_arguments(locals()))
 
     def singularities(
         self,
@@ -235,7 +235,7 @@ class MobilityMethods(Model):
         """
         from .singularities.singularities import SingularitiesOptions, singularities
 
-        return singularities(self, SingularitiesOptions.asked(locals()))
+        return singularities(self, SingularitiesOptions.from_arguments(locals()))
 
 
 class MotionMethods(Model):
@@ -350,7 +350,7 @@ class MotionMethods(Model):
         """
         from .simulation.checkpoints import CheckpointOptions, simulate_with_checkpoints
 
-        return simulate_with_checkpoints(self, CheckpointOptions.asked(locals()))
+        return simulate_with_checkpoints(self, CheckpointOptions.from_arguments(locals()))
 
     def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.
@@ -377,7 +377,7 @@ class MotionMethods(Model):
         """
         from .kinematics.prepared import PrepareOptions, prepare
 
-        return prepare(self, PrepareOptions.asked(locals()))
+        return prepare(self, PrepareOptions.from_arguments(locals()))
 
     def compare(
         self,
@@ -455,7 +455,7 @@ class MotionMethods(Model):
         """
         from .studies.formulation_comparison import CompareOptions, compare
 
-        return compare(self, CompareOptions.asked(locals()))
+        return compare(self, CompareOptions.from_arguments(locals()))
 
     def kinematics(
         self,
@@ -507,7 +507,7 @@ class MotionMethods(Model):
         """
         from .kinematics.driven_motion import KinematicsOptions, kinematics
 
-        return kinematics(self, KinematicsOptions.asked(locals()))
+        return kinematics(self, KinematicsOptions.from_arguments(locals()))
 
     def inverse_dynamics(
         self,
@@ -559,7 +559,7 @@ class MotionMethods(Model):
         """
         from .kinematics.inverse_dynamics import InverseDynamicsOptions, inverse_dynamics
 
-        return inverse_dynamics(self, InverseDynamicsOptions.asked(locals()))
+        return inverse_dynamics(self, InverseDynamicsOptions.from_arguments(locals()))
 
 
 class StaticsMethods(Model):
@@ -617,7 +617,7 @@ class StaticsMethods(Model):
         """
         from .statics.equilibrium import EquilibriumOptions, equilibrium
 
-        return equilibrium(self, EquilibriumOptions.asked(locals()))
+        return equilibrium(self, EquilibriumOptions.from_arguments(locals()))
 
     def equilibria(
         self,
@@ -667,7 +667,7 @@ class StaticsMethods(Model):
         """
         from .statics.equilibrium_series import EquilibriaOptions, equilibria
 
-        return equilibria(self, EquilibriaOptions.asked(locals()))
+        return equilibria(self, EquilibriaOptions.from_arguments(locals()))
 
     def linearize(
         self,
@@ -722,7 +722,7 @@ class StaticsMethods(Model):
         """
         from .linear.linearize import LinearizeOptions, linearize
 
-        return linearize(self, LinearizeOptions.asked(locals()))
+        return linearize(self, LinearizeOptions.from_arguments(locals()))
 
     def modes(
         self,
@@ -763,7 +763,7 @@ class StaticsMethods(Model):
         """
         from .linear.modes import ModesOptions, modes
 
-        return modes(self, ModesOptions.asked(locals()))
+        return modes(self, ModesOptions.from_arguments(locals()))
 
     def root_locus(
         self,
@@ -818,7 +818,7 @@ class StaticsMethods(Model):
         """
         from .linear.root_locus import RootLocusOptions, root_locus
 
-        return root_locus(self, RootLocusOptions.asked(locals()))
+        return root_locus(self, RootLocusOptions.from_arguments(locals()))
 
 
 class DesignMethods(Model):
@@ -888,7 +888,7 @@ class DesignMethods(Model):
         """
         from .sensitivity.sensitivity import SensitivityOptions, sensitivity
 
-        return sensitivity(self, SensitivityOptions.asked(locals()))
+        return sensitivity(self, SensitivityOptions.from_arguments(locals()))
 
     def optimize(
         self,
@@ -970,7 +970,7 @@ class DesignMethods(Model):
         """
         from .sensitivity.optimization import OptimizeOptions, optimize
 
-        return optimize(self, OptimizeOptions.asked(locals()))
+        return optimize(self, OptimizeOptions.from_arguments(locals()))
 
     def study(
         self,
@@ -1102,7 +1102,7 @@ class DesignMethods(Model):
         """
         from .studies.study import StudyOptions, study
 
-        return study(self, StudyOptions.asked(locals()))
+        return study(self, StudyOptions.from_arguments(locals()))
 
 
 class SymbolicMethods(Model):
@@ -1145,7 +1145,7 @@ class SymbolicMethods(Model):
         from .symbolic.derivation import symbolic
         from .symbolic.equations import SymbolicOptions
 
-        return symbolic(self, SymbolicOptions.asked(locals()))
+        return symbolic(self, SymbolicOptions.from_arguments(locals()))
 
     def export(
         self,
@@ -1201,4 +1201,4 @@ class SymbolicMethods(Model):
         """
         from .symbolic.export.export import ExportOptions, export
 
-        return export(self, ExportOptions.asked(locals()))
+        return export(self, ExportOptions.from_arguments(locals()))

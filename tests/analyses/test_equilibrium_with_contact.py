@@ -92,7 +92,7 @@ def balls(friction: float) -> fb.Mechanism:
 
 def test_a_beam_about_to_lift_off_its_far_support() -> None:
     """Supports at 0 and 1 m; a load at 1 m + a lifts the end at 0 as a grows; without it both carry by the lever."""
-    for weight, state in ((2.0, "sticks"), (4.0, "about to part")):
+    for weight, state in ((2.0, "sticks"), (4.0, "about to open")):
         m = fb.Mechanism("beam", planar=True, gravity=(0, -10.0))
         for x in (0.0, 1.0):
             m.add(fb.Ground(f"post_{x:.0f}", shape=fb.Sphere(radius=0.1), position=(x, -0.1)))
@@ -104,7 +104,7 @@ def test_a_beam_about_to_lift_off_its_far_support() -> None:
         far = next(k for k in e.touching if "post_0" in k.name)
         assert far.normal == pytest.approx(40 * 0.5 - 10 * weight * 0.5, abs=1e-6)
         assert far.state == state
-        assert (e.stability == "marginal") == (state == "about to part")
+        assert (e.stability == "marginal") == (state == "about to open")
 
 
 def test_a_door_leans_on_its_stop() -> None:

@@ -135,7 +135,9 @@ MADE = [sliding_box, tumbling_box, driven_piston, geared, racked, following, rou
 def momentum(moment, body, tables):
     """Of a body, about its centre of mass, world axes, (6,)."""
     S, b = tables.system, tables.structure.place[body]
-    _, R, w, v, _, _ = (np.array([float(np.ravel(x)[0]) for x in part]) for part in moment.alone.records.body(b))
+    _, R, w, v, _, _ = (
+        np.array([float(np.ravel(x)[0]) for x in part]) for part in moment.single_time_result.records.body(b)
+    )
     R = R.reshape(3, 3)
     return np.r_[S.bodies.mass[b] * v, R @ S.bodies.inertia[b].reshape(3, 3) @ R.T @ w]
 
@@ -185,7 +187,7 @@ def test_jumps_that_follow_one_another_are_one():
     blows = [("along", 0, 1.0, "blow")], [("along", 1, 4.0, "other")]
     first = EventImpulses({"stop": 1.0}, np.array([1.0, 2.0]), blows[0])
     second = EventImpulses({"stop": 0.5, "rope": 2.0}, np.array([0.5, -1.0]), blows[1])
-    both = sum_impulses([first, second]).plain()
+    both = sum_impulses([first, second]).as_plain_data()
     assert both == {"own": {"stop": 1.5, "rope": 2.0}, "rows": [1.5, 1.0], "blows": (*blows[0], *blows[1])}
 
 

@@ -95,7 +95,7 @@ def two_stretches(damping=0.0):
         "creep": {},
         "warnings": (),
     }
-    seen.told(result)
+    seen.add_phases(result)
     return result
 
 

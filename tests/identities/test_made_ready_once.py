@@ -164,7 +164,7 @@ def test_a_snapshot_is_the_same_until_something_changes():
 def test_tables_that_differ_keep_nothing_of_the_others():
     x = compile_mechanism(mechanisms.example("slider_crank.toml")).values
     for made in (x, x.structure):
-        assert dataclasses.replace(made).kept is not made.kept
+        assert dataclasses.replace(made).cache is not made.cache
 
 
 def test_what_was_made_of_earlier_values_is_let_go():

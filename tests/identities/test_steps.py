@@ -44,7 +44,7 @@ def test_rank_and_its_spaces():
     assert (p.rank, p.dependencies.shape, p.null.shape) == (3, (7, 4), (5, 2))
     assert np.abs(p.dependencies.T @ A).max() < 1e-13
     assert np.abs(A @ p.null).max() < 1e-13
-    assert np.allclose(p.span @ np.diag(p.values) @ p.seen.T, A)
+    assert np.allclose(p.span @ np.diag(p.values) @ p.row_space.T, A)
     assert column_space(A).shape == (7, 3)
     assert (rank(np.zeros((0, 4))), null_space(np.zeros((0, 4))).shape, rank(np.zeros((2, 2)))) == (0, (4, 4), 0)
     assert (rank(1e-12 * A), rank(1e-12 * A, size=1.0)) == (3, 0)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from flyball.compiler.ahead_of_time import all_kernels, missing_kernels
+from flyball.compiler.formulas import FAILED
 from flyball.compiler.kernels import kernel
 from flyball.compiler.object_code import (
     BASELINES,
-    FAILED,
     SHIPPED,
     baseline,
     cache_folder,

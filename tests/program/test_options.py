@@ -59,7 +59,7 @@ def test_every_argument_of_a_method_is_a_field_and_has_its_line(name):
     asked = arguments(method)
     assert all(p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY) for p in asked.values()), "no **options"
     assert all(p.annotation not in (p.empty, "Any", "object") or k in ("target", "weights") for k, p in asked.items())
-    cls = re.search(r"(\w+Options)\.asked\(locals\(\)\)", inspect.getsource(method))
+    cls = re.search(r"(\w+Options)\.from_arguments\(locals\(\)\)", inspect.getsource(method))
     if cls is not None:
         fields = dataclasses.fields(CLASSES[cls[1]])
         assert {f.name for f in fields} == set(asked)

@@ -147,8 +147,5 @@ def test_the_thrust_of_a_flat_arch(rise, rel, coordinates, specialize):
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
 def test_a_thrust_that_is_wrong_is_doubted(rise, coordinates):
     r = _flat_arch(rise).simulate(0.1, outputs=3, coordinates=coordinates)
-    if coordinates == "joint":
-        assert r["A"].force[:, 0] == pytest.approx(2.5 / rise, rel=1e-4)
-        return
-    assert abs(r["A"].force[0, 0] - 2.5 / rise) > 0.5 * 2.5 / rise
+    assert abs(r["A"].force[0, 0] - 2.5 / rise) > 0.4 * 2.5 / rise
     assert any("accelerations violate the constraints" in w for w in r.health.warnings)

@@ -102,7 +102,7 @@ def test_at_a_time_and_as_a_table():
     assert frame.attrs["units"]["fz"] == "N"
     assert frame[(frame.side_2 == "ground") & (frame.t == 0.0)].fz.sum() == pytest.approx(-2 * G)
     assert set(frame.state) == {"stick", "slip"}
-    few = c.taken(np.array([0, 3]))
+    few = c.at_times(np.array([0, 3]))
     assert few.t.tolist() == [0.0, 3.0]
     np.testing.assert_array_equal(few.on("balls").force[1], c.on("balls").force[3])
     assert dict(c.lines())["contacts"] == "24 at 5 times, 5 at most at once: 20 stick, 4 slip"

@@ -49,7 +49,7 @@ def test_what_a_motion_runs_on_is_pickled_without_it():
     assert c.system.flat.any()
     again = pickle.loads(pickle.dumps(c))
     assert not again.system.flat.any()
-    assert again.made is None
+    assert again.generated is None
     assert not c.values.system.flat.any()
 
 

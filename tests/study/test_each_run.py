@@ -24,7 +24,7 @@ def question(m, names, of, specialize=False, **more):
     times = np.array([0.0, 0.01])
     usual = {k: p.default for k, p in inspect.signature(m.simulate).parameters.items()}
     given = usual | {"t_end": 0.01, "outputs": times, "specialize": specialize, "progress": False} | more
-    o = SimulateOptions.asked(given)
+    o = SimulateOptions.from_arguments(given)
     single, m = MotionAnalysis(), m.snapshot()
     return RunSpecification(m, single, o, tuple(names), study_quantities(of, partial(single.named, m)), times)
 

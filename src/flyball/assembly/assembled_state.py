@@ -226,19 +226,19 @@ def consistent_state(
     plain = compile_mechanism(model, parameters=parameters)
     x = plain.values
     model, key = x.structure.model, float(t).hex()
-    home = x if _has_own_poses(plain) else x.unforced
-    found = home.kept.get(
+    home = x if _poses_differ(plain) else x.unforced
+    found = home.cache.get(
         "assembled", key, MAX_CACHED_ASSEMBLIES, lambda: _assemble_anew(model, plain, t, parameters, explain).again()
     )
     return found.again() if found.compiled.values is x else found.of(plain)
 
 
-def _has_own_poses(c: CompiledMechanism) -> bool:
+def _poses_differ(c: CompiledMechanism) -> bool:
     """Return whether reference angles and curve positions differ from those of values that differ in forces only."""
     x, n = c.values, len(c.structure.controls)
     if (other := x.alike) is None:
         return True
-    return not np.array_equal(c.z[n:], other.kept.get("places", None, 1, lambda: initial_hints(other))[n:])
+    return not np.array_equal(c.z[n:], other.cache.get("places", None, 1, lambda: initial_hints(other))[n:])
 
 
 def _assemble_anew(
@@ -410,7 +410,7 @@ def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[s
     out = {}
     model = model.snapshot()
     tables = {x.name: x for x in model.tables}
-    laws = model.kept.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
+    laws = model.cache.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
     for d in model.drivers:
         law = laws[d.name]
         if law.names <= {"t", *env}:

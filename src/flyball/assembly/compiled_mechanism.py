@@ -41,30 +41,30 @@ class CompiledMechanism:
     z: np.ndarray  # controller states, angles and curve positions as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values that replace the model's own
     system: System = field(init=False, repr=False, compare=False)  # tables of `values`, or with addresses of `made`
-    made: Any = field(default=None, init=False, repr=False, compare=False)  # generated code; None: general engine
+    generated: Any = field(default=None, init=False, repr=False, compare=False)  # generated code; None: general engine
 
     def __post_init__(self) -> None:
         self.system = self.values.system
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without workspace and addresses, which are invalid in another process."""
-        return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "made")}
+        return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "generated")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, system=state["values"].system, made=None)
+        vars(self).update(state, system=state["values"].system, generated=None)
 
     def run_on(self, code: Any) -> None:
         """Use generated code from now on, as far as it replaces the engine; the contents of the workspace are kept."""
         x, before = self.values, vars(self).pop("scratch", None)
         vars(self).pop("work", None)
-        self.made, self.system = code, x.kept.get("made", id(code), 1, lambda: (code, code.system(x.system)))[1]
+        self.generated, self.system = code, x.cache.get("made", id(code), 1, lambda: (code, code.system(x.system)))[1]
         if before is not None:
             kept = self.work._replace(flat=before.fields.flat)  # the new flat array is longer, for the code itself
             assign(kept, before.fields)
 
     def run_on_tables(self) -> None:
         """Use the general engine from now on."""
-        self.made, self.system = None, self.values.system
+        self.generated, self.system = None, self.values.system
 
     @cached_property
     def work(self) -> Work:
@@ -187,13 +187,13 @@ class CompiledMechanism:
         """
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        same = other.drawn(q) and self.values.given is other.values.given
+        same = other.is_reference_configuration(q) and self.values.given is other.values.given
         bodies = other.moving(t, q, v) if v.any() or not same else {}
         own = self.values.q.copy() if same else positions(self.values, bodies, hints)
         self.at(t, own, np.zeros(self.structure.nv))
         return own, joint_velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
 
-    def drawn(self, q: np.ndarray) -> bool:
+    def is_reference_configuration(self, q: np.ndarray) -> bool:
         """Return whether q is the reference configuration, with its angles."""
         return np.array_equal(q, self.values.q) and np.array_equal(self.z, initial_hints(self.values))
 
@@ -239,7 +239,7 @@ class CompiledMechanism:
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rows, columns and entries of the mass matrix of absolute coordinates."""
         x, table = self.values, self.values.system.bodies
-        return x.unforced.kept.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
+        return x.unforced.cache.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """Return R, sparse unless ``dense``, with R R^T the inverse mass matrix of absolute coordinates; 0 for fixed

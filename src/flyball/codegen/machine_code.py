@@ -82,7 +82,7 @@ class LinkedProcedures:
         self.procedures = [constants, *made.values()]
 
     def _link(self, p: Procedure, before: list[Procedure]) -> None:
-        reads = dict(p.reads)
+        reads = dict(p.inputs)
         to_see = [x for x in p.results if isinstance(x, Node)]
         seen = set()
         while to_see:
@@ -93,14 +93,14 @@ class LinkedProcedures:
             if not x.moving:
                 reads[x.index] = self._constant(x)
                 continue
-            found = None if _is_multiple(x) else self._left(x, before)
+            found = None if _is_multiple(x) else self._stored_place(x, before)
             if found is not None:
                 reads[x.index] = found
                 continue
             if x.op == SYMBOL:
                 raise KeyError(f"{p.name} needs {x!r}, and nobody has left it")
             to_see.extend(x.args)
-        p.reads = reads
+        p.inputs = reads
         made = ordered_operations(p.results, reads)
         self.computed[p.name] = {x.index for x in made}
         self.searched[p.name] = {_spline_search(x) for x in made if x.index not in reads} - {None}
@@ -114,9 +114,9 @@ class LinkedProcedures:
             self.hoisted.append(x)
         return self.slots[x.index]
 
-    def _left(self, x: Node, before: list[Procedure]) -> Place | None:
+    def _stored_place(self, x: Node, before: list[Procedure]) -> Place | None:
         for p in before:
-            here = x.index in self.computed[p.name] or (x.op == SYMBOL and x.index in p.reads)
+            here = x.index in self.computed[p.name] or (x.op == SYMBOL and x.index in p.inputs)
             if (
                 here or _spline_search(x) in self.searched[p.name]
             ):  # the piece is known, so another derivative order is cheap
@@ -261,7 +261,7 @@ def trace_procedures(s: Structure, S: System) -> ProgramText:
                 break
             known |= more
         linked = LinkedProcedures(stages)
-        count = sum(len(ordered_operations(p.results, p.reads)) for p in linked.procedures)
+        count = sum(len(ordered_operations(p.results, p.inputs)) for p in linked.procedures)
         return ProgramText(llvm_text(linked), sorted(known), linked.scratch, linked.constants, count, linked.laws)
     except UndeterminedDecision as error:
         raise Refused(f"a formula of it decides by where it is ({error})") from error

@@ -148,7 +148,7 @@ class ProcedureRecorder:
         array = self.array(name)
         return [(self.at(name, *i), array[i]) for i in ((c,) if row is None else (row, c) for c in columns)]
 
-    def kept(self, name: str) -> list[tuple[Place, Any]]:
+    def array_entries(self, name: str) -> list[tuple[Place, Any]]:
         """Entries of a whole one-dimensional array, with the places to write them to."""
         return [(self.at(name, e), x) for e, x in enumerate(self.array(name))]
 
@@ -199,11 +199,11 @@ class SolveProcedures(ProcedureRecorder):
         S, W = self.S, self.W
         if solver == SCHUR:
             rows_by_inverse_mass(S, W)
-            self.add("REUSE", {}, self.kept("H"))
+            self.add("REUSE", {}, self.array_entries("H"))
         factor(S, W)
-        stores = {SCHUR: self.kept("H"), COUPLED: self.kept("M"), ARTICULATED: []}[solver]
+        stores = {SCHUR: self.array_entries("H"), COUPLED: self.array_entries("M"), ARTICULATED: []}[solver]
         if solver != ARTICULATED:
-            stores += self.kept("L") + self.stored("D", 0, range(len(W.D[0])))
+            stores += self.array_entries("L") + self.stored("D", 0, range(len(W.D[0])))
             stores += self.stored("rows.diagonal", None, range(self.nr))
         self.add("FACTOR", {}, stores)
         reads: dict[int, Place] = {}
@@ -291,7 +291,7 @@ class MechanismProcedures(SolveProcedures):
     def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
         super().__init__(s, S, known)
         self.read_by_others = self.entries((self._place_rates, self._weighed))
-        self.read_at_ends = self.entries((self._remembered_states, self._law_inputs), far=True)
+        self.read_at_ends = self.entries((self._updated_angle_states, self._law_inputs), far=True)
         self.finishes = self._can_progress()
         self.prepared()
         self.placed()
@@ -367,7 +367,7 @@ class MechanismProcedures(SolveProcedures):
         progress(self.S, W, self.z, np.zeros(len(self.z), object))
         return []
 
-    def _remembered_states(self, W: Work) -> list[Any]:
+    def _updated_angle_states(self, W: Work) -> list[Any]:
         z = self.z.copy()
         remember(self.S, W, z)
         return list(z)

@@ -75,11 +75,11 @@ class Plan:
 
 def plan(x: Values) -> Plan:
     """Inspect a mechanism; nothing is traced."""
-    return x.kept.get("plan of made code", None, 1, lambda: _planned(x.structure, x.system))
+    return x.cache.get("plan of made code", None, 1, lambda: _planned(x.structure, x.system))
 
 
 def _planned(s: Structure, S: System) -> Plan:
-    digest = hashlib.sha256(s.kept.get("code of structure", None, 1, lambda: _structure(s, S)))
+    digest = hashlib.sha256(s.cache.get("code of structure", None, 1, lambda: _structure(s, S)))
     entries = np.concatenate([table.ravel() for table in traced_arrays(S).values()])
     for x in PLAIN_ENTRIES:
         digest.update(np.packbits(entries == x).tobytes())

@@ -28,6 +28,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}  # division as in C; no memory allocation
 LOCK = threading.RLock()
+ENTRY_NAME = "flyball_kernel"  # the name of a kernel's entry point in its object
+FAILED = -(2**63)  # result of a kernel if one of its formulas raised an error
 KERNELS: list[Any] = []  # every `kernels.Kernel`
 FIRST_ADDRESS = 1 << 16
 """Smallest possible address of a code table; the numbers of the kinds of built-in elements are smaller."""
@@ -123,7 +125,7 @@ COMPILED = (
     "tables/table_definitions.py",
 )
 """Files and folders that contain formulas and kernels, and all constants that these use."""
-COMPILER = ("formulas.py", "kernels.py", "numba_target.py", "object_code.py", "struct_layout.py")
+COMPILER = ("formulas.py", "kernels.py", "numba_target.py", "numba_types.py", "object_code.py", "struct_layout.py")
 """Files of the compiler that determine the code."""
 GENERATED_SOURCES: dict[str, str] = {}
 """Sources of formulas that were generated at import (`generated_formula`): module and name -> text."""

@@ -3,28 +3,25 @@
 Numba links, optimises and emits every callee as a library of its own, then again inside each of its callers. Here a
 callee is only translated to LLVM's language (`Library`), and `Library.modules` returns all those of a kernel. Numba
 allows additional targets (`numba.core.target_extension`): nothing of Numba's is replaced.
-
-Structures and arrays are passed by address. Numba passes a tuple of arrays as its parts, some two hundred numbers for a
-mechanism; here ``S.field`` is the address of a structure or of an array's description in it, and ``S.field[i, j]``
-reads the data address, the length of a row, and the element. Nothing writes to descriptions, so that the optimiser may
-read each part once and keep it (`invariant.load`). Views and whole arrays are Numba's own.
 """
 
 from __future__ import annotations
 
+import gc
 import operator
 from collections.abc import Iterator
 from functools import cached_property, partial
 from importlib import import_module
 from typing import Any
 
-from llvmlite import ir
-from numba.core import codegen, cpu, typed_passes, types, typing, untyped_passes
-from numba.core.cgutils import normalize_ir_text
+from llvmlite import binding, ir
+from numba.core import cgutils, codegen, cpu, typed_passes, types, typing, untyped_passes
 from numba.core.compiler import CompilerBase
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager
 from numba.core.descriptors import TargetDescriptor
 from numba.core.dispatcher import Dispatcher
+from numba.core.errors import TypingError
 from numba.core.target_extension import (
     CPU,
     JitDecorator,
@@ -33,440 +30,21 @@ from numba.core.target_extension import (
     target_override,
     target_registry,
 )
+from numba.extending import intrinsic
 from numba.extending import overload as numba_overload
 
-from .formulas import FIRST_ADDRESS, KERNELS, OPTIONS, by_address, call, call_bound, formula_at, has_formula
-from .struct_layout import DATA, HEAD, Array, RecordLayout, Struct, struct_layout
-
-_REFERENCE_TYPES: dict[str, Any] = {}
-
-
-def reference(layout: Struct | Array | RecordLayout) -> Any:
-    """Numba's type of a structure or of an array that a kernel takes by address."""
-    return _REFERENCE_TYPES["structure" if isinstance(layout, Struct) else "array"](layout)
-
-
-def load_members(builder: Any, address: Any, skipped: int = 0) -> Any:
-    """Read the value at an address number by number: the optimiser does not split larger reads.
-
-    The first ``skipped`` members are left out.
-    """
-    from llvmlite import ir
-    from numba.core import cgutils
-
-    of = address.type.pointee
-    if not isinstance(of, ir.Aggregate):
-        number = builder.load(address)
-        number.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return number
-    whole = ir.Constant(of, None)
-    for k in range(skipped, len(of)):
-        whole = builder.insert_value(whole, load_members(builder, cgutils.gep_inbounds(builder, address, 0, k)), k)
-    return whole
-
-
-class _ArrayReader:
-    """Generator of code that reads an array's description."""
-
-    def __init__(self, context: Any, builder: Any, typ: Any, value: Any) -> None:
-        self.context, self.builder, self.array, self.address = context, builder, typ.array, value
-
-    def word(self, k: int, of: Any = None) -> Any:
-        """Word k of the description: see `layout`."""
-        from llvmlite import ir
-
-        integer = ir.IntType(64)
-        place = self.builder.gep(self.address, [integer(8 * k)], inbounds=True)
-        return load_members(self.builder, self.builder.bitcast(place, (of or integer).as_pointer()))
-
-    def shape(self, k: int) -> Any:
-        """Length of dimension k."""
-        return self.word(HEAD // 8 + k)
-
-    def data(self) -> Any:
-        """Address of the numbers."""
-        return self.word(DATA // 8, self.context.get_data_type(self.array.dtype).as_pointer())
-
-    def whole(self) -> Any:
-        """The array in Numba's form, without ownership: references are not counted here."""
-        of = self.context.get_value_type(self.array).as_pointer()
-        return load_members(self.builder, self.builder.bitcast(self.address, of), 2)
-
-    def indices(self, typ: Any, value: Any) -> list[Any] | None:
-        """Integers of an index, counted from the end where negative; None if it contains anything else."""
-        from numba.core import cgutils, types
-
-        several = isinstance(typ, types.BaseTuple)
-        given = list(typ) if several else [typ]
-        if not all(isinstance(x, types.Integer) for x in given):
-            return None
-        values = cgutils.unpack_tuple(self.builder, value, len(given)) if several else [value]
-        out = []
-        for k, (x, of) in enumerate(zip(values, given, strict=True)):
-            i = self.context.cast(self.builder, x, of, types.intp)
-            known = getattr(x, "constant", None)
-            if of.signed and not (isinstance(known, int) and known >= 0):
-                below = self.builder.icmp_signed("<", i, i.type(0))
-                i = self.builder.select(below, self.builder.add(i, self.shape(k)), i)
-            out.append(i)
-        return out
-
-    def element(self, indices: list[Any]) -> Any:
-        """Address of an element; of the first of a row if the last index is left out."""
-        flat = indices[0]
-        for k in range(1, self.array.ndim):
-            flat = self.builder.mul(flat, self.shape(k))
-            flat = self.builder.add(flat, indices[k]) if k < len(indices) else flat
-        return self.builder.gep(self.data(), [flat], inbounds=True)
-
-    def row(self, typ: Any, index: Any) -> Any:
-        """Row of a two-dimensional table, as an array of type ``typ``."""
-        from llvmlite import ir
-
-        model, length = self.context.data_model_manager[typ], self.shape(1)
-        width = length.type(self.context.get_abi_sizeof(self.context.get_data_type(typ.dtype)))
-        made = ir.Constant(self.context.get_value_type(typ), None)
-        filled: list[tuple[str, Any, list[int]]] = [
-            ("nitems", length, []),
-            ("itemsize", width, []),
-            ("data", self.element([index]), []),
-            ("shape", length, [0]),
-            ("strides", width, [0]),
-        ]
-        for name, value, k in filled:
-            made = self.builder.insert_value(made, value, [model.get_field_position(name), *k])
-        return made
-
-
-def _register_structures(types: Any) -> None:
-    """Register references to structures, and their fields."""
-    from llvmlite import ir
-    from numba.core import cgutils
-    from numba.core.datamodel import models
-    from numba.core.extending import lower_builtin, register_model, type_callable
-    from numba.core.imputils import lower_getattr_generic
-    from numba.core.typing.templates import AttributeTemplate, infer_getattr
-
-    class Structure(types.Type):
-        """Type of a structure passed by address."""
-
-        def __init__(self, layout: Struct) -> None:
-            self.layout, self.of = layout, dict(layout.fields)
-            super().__init__(name=f"{layout.of.__module__}.{layout}")
-
-    _REFERENCE_TYPES["structure"] = Structure
-
-    @register_model(Structure)
-    class StructureModel(models.OpaqueModel):
-        """Data model: an address."""
-
-    @infer_getattr
-    class Fields(AttributeTemplate):  # type: ignore[misc]
-        key = Structure
-
-        def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
-            return reference(typ.of[attr]) if attr in typ.of else None
-
-    @lower_getattr_generic(Structure)
-    def read(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
-        return builder.gep(value, [ir.IntType(64)(typ.layout.offset(name))], inbounds=True)
-
-    @type_callable(by_address)
-    def of(context):  # type: ignore[no-untyped-def]
-        return lambda fields: Structure(_layout_of(fields))
-
-    # not an overload, which would be a function of its own whose memory is gone when it returns
-    @lower_builtin(by_address, types.BaseNamedTuple)
-    def put(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        address = builder.bitcast(cgutils.alloca_once_value(builder, args[0]), cgutils.voidptr_t)
-        # an empty piece of assembly: no read through its result may be moved before the writes of the tuple
-        through = ir.FunctionType(address.type, [address.type])
-        return builder.asm(through, "", "=r,0,~{memory}", [address], True)
-
-
-def _layout_of(fields: Any) -> Struct:
-    """Layout of a named tuple of arrays that compiled code creates."""
-    from numba.core.errors import TypingError
-
-    is_complex = any(str(getattr(x, "dtype", "")).startswith("complex") for x in fields.types)
-    layout = struct_layout(fields.instance_class, is_complex)
-    wanted = [reference(of).array for of in layout.arrays()]
-    if list(fields.types) != wanted:
-        raise TypingError(f"{layout.of.__name__}: the arrays {fields.types} are not those that it declares: {wanted}")
-    return layout
-
-
-def _register_arrays(types: Any) -> None:
-    """Register references to arrays, and the operations on them in formulas."""
-    from numba.core.datamodel import models
-    from numba.core.extending import lower_builtin, lower_cast, register_model
-    from numba.core.imputils import lower_getattr, lower_getattr_generic, lower_setattr_generic
-    from numba.core.typeconv import Conversion
-    from numba.core.typing.templates import (
-        AbstractTemplate,
-        AttributeTemplate,
-        infer_getattr,
-        infer_global,
-        signature,
-    )
-    from numba.np.arrayobj import load_item, store_item
-    from numba.np.numpy_support import from_dtype
-    from numpy import dtype
-
-    class Reference(types.Type):
-        """Type of an array passed by the address of its description."""
-
-        def __init__(self, named: Array | RecordLayout) -> None:
-            layout = named.array if isinstance(named, RecordLayout) else named
-            self.names = named.of.names if isinstance(named, RecordLayout) else ()
-            self.layout = named
-            self.array = types.Array(from_dtype(dtype(layout.dtype)), layout.ndim, "C")
-            self.dtype, self.ndim = self.array.dtype, layout.ndim
-            super().__init__(name=f"Array_{named}")
-
-        def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-            return Conversion.safe if other == self.array else None
-
-        def unify(self, typingctx: Any, other: Any) -> Any:
-            return self.array if other == self.array else None
-
-    _REFERENCE_TYPES["array"] = Reference
-
-    @register_model(Reference)
-    class ReferenceModel(models.OpaqueModel):
-        """Data model: an address."""
-
-    class Item(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
-            if not isinstance(args[0], Reference):
-                return None
-            found = self.context.resolve_function_type(self.key, (args[0].array, *args[1:]), kws)
-            return found and signature(found.return_type, args[0], *found.args[1:])
-
-    for item in (operator.getitem, operator.setitem):
-        infer_global(item)(type("Item", (Item,), {}))
-
-    @infer_getattr
-    class Attributes(AttributeTemplate):  # type: ignore[misc]
-        key = Reference
-
-        def resolve_shape(self, typ: Any) -> Any:
-            return types.UniTuple(types.intp, typ.array.ndim)
-
-        def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
-            return typ.dtype if attr in typ.names else None
-
-    def by_numba(context: Any, builder: Any, sig: Any, place: _ArrayReader, args: Any, what: Any) -> Any:
-        own = signature(sig.return_type, place.array, *sig.args[1:])
-        return context.get_function(what, own)(builder, (place.whole(), *args[1:]))
-
-    def get(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _ArrayReader(context, builder, sig.args[0], args[0])
-        indices, array = place.indices(sig.args[1], args[1]), place.array
-        if indices is not None and len(indices) == array.ndim:
-            return load_item(context, builder, array, place.element(indices))
-        if indices is not None and array.ndim == 2:
-            return place.row(sig.return_type, indices[0])
-        return by_numba(context, builder, sig, place, args, operator.getitem)
-
-    def put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _ArrayReader(context, builder, sig.args[0], args[0])
-        indices, array = place.indices(sig.args[1], args[1]), place.array
-        if indices is None or len(indices) != array.ndim or isinstance(sig.args[2], types.Buffer):
-            return by_numba(context, builder, sig, place, args, operator.setitem)
-        value = context.cast(builder, args[2], sig.args[2], array.dtype)
-        store_item(context, builder, array, value, place.element(indices))
-        return context.get_dummy_value()
-
-    for index in (types.Integer, types.SliceType, types.BaseTuple):
-        lower_builtin(operator.getitem, Reference, index)(get)
-        lower_builtin(operator.setitem, Reference, index, types.Any)(put)
-
-    @lower_getattr(Reference, "shape")
-    def shape(context: Any, builder: Any, typ: Any, value: Any) -> Any:
-        from numba.core import cgutils
-
-        place = _ArrayReader(context, builder, typ, value)
-        return cgutils.pack_array(builder, [place.shape(k) for k in range(typ.ndim)])
-
-    @lower_getattr_generic(Reference)
-    def entry(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
-        place = _ArrayReader(context, builder, typ, value)
-        at = place.element([context.get_constant(types.intp, typ.names.index(name))])
-        return load_item(context, builder, typ.array, at)
-
-    @lower_setattr_generic(Reference)
-    def set_entry(context: Any, builder: Any, sig: Any, args: Any, name: str) -> Any:
-        typ, of = sig.args
-        place = _ArrayReader(context, builder, typ, args[0])
-        at = place.element([context.get_constant(types.intp, typ.names.index(name))])
-        store_item(context, builder, typ.array, context.cast(builder, args[1], of, typ.dtype), at)
-
-    @lower_cast(Reference, types.Array)
-    def whole(context: Any, builder: Any, of: Any, to: Any, value: Any) -> Any:
-        return _ArrayReader(context, builder, of, value).whole()
-
-
-def _register_calls(types: Any) -> None:
-    """Register calls by address."""
-    from llvmlite import ir
-    from numba.core.errors import TypingError
-    from numba.extending import intrinsic
-
-    integer = ir.IntType(64)
-
-    @intrinsic
-    def jump(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        given = A, B, C, D, E
-        layouts = tuple(getattr(x, "layout", None) for x in given)
-        if not any(k.parameters[:-1] == layouts for k in KERNELS):
-            raise TypingError(f"no kernel takes {given}")
-
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            of = ir.FunctionType(integer, [x.type for x in args[1:]])
-            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
-
-        return types.int64(types.int64, *given, types.int64), generate
-
-    @intrinsic
-    def leap(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            of = ir.FunctionType(integer, [integer] * 6)
-            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
-
-        return types.int64(*[types.int64] * 7), generate
-
-    @overload(call)
-    def choose(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        return lambda address, A, B, C, D, E, task: jump(address, A, B, C, D, E, task)
-
-    @overload(call_bound)
-    def choose_bound(words, task):  # type: ignore[no-untyped-def]
-        return lambda words, task: leap(words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task))
-
-
-def number_type(shape: Any, is_complex: bool) -> Any:
-    """Numba's type of nested tuples of numbers, from their lengths, nested likewise; 0 is a number."""
-    from numba.core import types
-
-    if isinstance(shape, tuple):
-        return types.BaseTuple.from_types([number_type(x, is_complex) for x in shape])
-    number = types.complex128 if is_complex else types.float64
-    return types.UniTuple(number, shape) if shape else number
-
-
-def nested_lengths(typ: Any) -> Any:
-    """Lengths of nested tuples of numbers, as in `number_type`; None if they contain anything else."""
-    from numba.core import types
-
-    if isinstance(typ, types.Number | types.Boolean):
-        return 0
-    if not isinstance(typ, types.BaseTuple):
-        return None
-    inner = [nested_lengths(x) for x in typ]
-    return len(inner) if not any(x != 0 for x in inner) else None if None in inner else tuple(inner)
-
-
-def tuple_leaves(builder: Any, typ: Any, value: Any) -> Iterator[tuple[Any, Any]]:
-    """Types and values of the numbers in nested tuples."""
-    from numba.core import types
-
-    if isinstance(typ, types.BaseTuple):
-        for k, x in enumerate(typ):
-            yield from tuple_leaves(builder, x, builder.extract_value(value, k))
-    else:
-        yield typ, value
-
-
-def nested_value(context: Any, builder: Any, typ: Any, given: Iterator[tuple[Any, Any]]) -> Any:
-    """Value of nested tuples, from types and values of numbers."""
-    from numba.core import types
-
-    if isinstance(typ, types.BaseTuple):
-        return context.make_tuple(builder, typ, [nested_value(context, builder, x, given) for x in typ])
-    of, value = next(given)
-    return context.cast(builder, value, of, typ)
-
-
-def load_numbers(builder: Any, number: Any, start: Any, count: int) -> Iterator[tuple[Any, Any]]:
-    """Types and values of consecutive numbers in memory."""
-    from llvmlite import ir
-
-    for k in range(count):
-        yield number, builder.load(builder.gep(start, [ir.IntType(64)(k)]))
-
-
-def store_numbers(context: Any, builder: Any, number: Any, given: Iterator[tuple[Any, Any]], start: Any) -> None:
-    """Store numbers consecutively in memory, converted to one type."""
-    from llvmlite import ir
-
-    for k, (of, value) in enumerate(given):
-        builder.store(context.cast(builder, value, of, number), builder.gep(start, [ir.IntType(64)(k)]))
-
-
-def _register_code_tables(types: Any) -> None:
-    """Register calls of formulas by the address of a code table.
-
-    It has two words for each formula, its code for floats and for complex numbers. The code takes two addresses: of the
-    consecutive numbers of the arguments, and of the memory for those of the result.
-    """
-    from llvmlite import ir
-    from numba.core import cgutils
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def word(typing, address):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            return builder.load(builder.inttoptr(args[0], ir.IntType(64).as_pointer()))
-
-        return types.int64(types.int64), generate
-
-    @intrinsic
-    def run(typing, code, arguments, like):  # type: ignore[no-untyped-def]
-        first = like
-        while isinstance(first, types.BaseTuple):
-            first = first[0]
-        number = types.complex128 if isinstance(first, types.Complex) else types.float64
-
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            given = list(tuple_leaves(builder, arguments, args[1]))
-            count = len(list(tuple_leaves(builder, like, args[2])))
-            of = context.get_data_type(number)
-            begin, end = (cgutils.alloca_once(builder, of, ir.IntType(64)(n)) for n in (len(given), count))
-            store_numbers(context, builder, number, iter(given), begin)
-            function = ir.FunctionType(ir.VoidType(), [of.as_pointer()] * 2)
-            builder.call(builder.inttoptr(args[0], function.as_pointer()), [begin, end])
-            return nested_value(context, builder, like, load_numbers(builder, number, end, count))
-
-        return like(types.int64, arguments, like), generate
-
-    @overload(formula_at)
-    def choose(table, k, arguments, like):  # type: ignore[no-untyped-def]
-        first = like
-        while isinstance(first, types.BaseTuple):
-            first = first[0]
-        if isinstance(first, types.Complex):
-            return lambda table, k, arguments, like: (
-                run(word(table + 16 * k + 8), arguments, like) if table >= FIRST_ADDRESS else like
-            )
-        return lambda table, k, arguments, like: (
-            run(word(table + 16 * k), arguments, like) if table >= FIRST_ADDRESS else like
-        )
-
-    @overload(has_formula)
-    def look(table, k):  # type: ignore[no-untyped-def]
-        return lambda table, k: word(table + 16 * k) != 0 if table >= FIRST_ADDRESS else False
-
-
-def register_types() -> None:
-    """Register these types, and calls, with Numba."""
-    from numba.core import types
-
-    _register_structures(types)
-    _register_arrays(types)
-    _register_calls(types)
-    _register_code_tables(types)
-
+from .formulas import ENTRY_NAME, FAILED, FIRST_ADDRESS, KERNELS, OPTIONS, call, call_bound, formula_at, has_formula
+from .numba_types import (
+    INTEGER,
+    load_numbers,
+    nested_lengths,
+    nested_value,
+    number_type,
+    reference,
+    store_numbers,
+    tuple_leaves,
+)
+from .struct_layout import Array, Struct
 
 TARGET_NAME = "flyball"
 PASSES = (
@@ -504,7 +82,7 @@ class Library(codegen.CPUCodeLibrary):
 
     def add_ir_module(self, ir_module: Any) -> None:
         """Store the text; nothing is optimised here."""
-        self.texts.append(normalize_ir_text(str(ir_module)))
+        self.texts.append(cgutils.normalize_ir_text(str(ir_module)))
 
     def finalize(self) -> None:
         """No final work."""
@@ -690,6 +268,91 @@ overload = partial(numba_overload, jit_options=OPTIONS, target=TARGET_NAME)
 """``@overload(function)``: the replacement of a Python function in compiled code."""
 
 
+@intrinsic
+def _call_kernel(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+    given = A, B, C, D, E
+    layouts = tuple(getattr(x, "layout", None) for x in given)
+    if not any(k.parameters[:-1] == layouts for k in KERNELS):
+        raise TypingError(f"no kernel takes {given}")
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        of = ir.FunctionType(INTEGER, [x.type for x in args[1:]])
+        return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
+
+    return types.int64(types.int64, *given, types.int64), generate
+
+
+@intrinsic
+def _call_words(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        of = ir.FunctionType(INTEGER, [INTEGER] * 6)
+        return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
+
+    return types.int64(*[types.int64] * 7), generate
+
+
+@overload(call)
+def _choose_call(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+    return lambda address, A, B, C, D, E, task: _call_kernel(address, A, B, C, D, E, task)
+
+
+@overload(call_bound)
+def _choose_call_bound(words, task):  # type: ignore[no-untyped-def]
+    return lambda words, task: _call_words(
+        words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task)
+    )
+
+
+def _is_complex(typ: Any) -> bool:
+    """Whether the first number of nested tuples is complex."""
+    while isinstance(typ, types.BaseTuple):
+        typ = typ[0]
+    return isinstance(typ, types.Complex)
+
+
+# A code table has two words for each formula: the addresses of its code for floats and for complex numbers. The code
+# takes two addresses: of the consecutive numbers of the arguments, and of the memory for those of the result.
+@intrinsic
+def _word_at(typing, address):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.load(builder.inttoptr(args[0], INTEGER.as_pointer()))
+
+    return types.int64(types.int64), generate
+
+
+@intrinsic
+def _run_formula(typing, code, arguments, like):  # type: ignore[no-untyped-def]
+    number = types.complex128 if _is_complex(like) else types.float64
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        given = list(tuple_leaves(builder, arguments, args[1]))
+        count = len(list(tuple_leaves(builder, like, args[2])))
+        of = context.get_data_type(number)
+        begin, end = (cgutils.alloca_once(builder, of, INTEGER(n)) for n in (len(given), count))
+        store_numbers(context, builder, number, iter(given), begin)
+        function = ir.FunctionType(ir.VoidType(), [of.as_pointer()] * 2)
+        builder.call(builder.inttoptr(args[0], function.as_pointer()), [begin, end])
+        return nested_value(context, builder, like, load_numbers(builder, number, end, count))
+
+    return like(types.int64, arguments, like), generate
+
+
+@overload(formula_at)
+def _choose_formula_at(table, k, arguments, like):  # type: ignore[no-untyped-def]
+    if _is_complex(like):
+        return lambda table, k, arguments, like: (
+            _run_formula(_word_at(table + 16 * k + 8), arguments, like) if table >= FIRST_ADDRESS else like
+        )
+    return lambda table, k, arguments, like: (
+        _run_formula(_word_at(table + 16 * k), arguments, like) if table >= FIRST_ADDRESS else like
+    )
+
+
+@overload(has_formula)
+def _choose_has_formula(table, k):  # type: ignore[no-untyped-def]
+    return lambda table, k: _word_at(table + 16 * k) != 0 if table >= FIRST_ADDRESS else False
+
+
 def translate(function: Any, argument_types: tuple[Any, ...], first_order: bool) -> tuple[Any, Any, Library]:
     """Translate a function and all that it calls to LLVM's language.
 
@@ -702,3 +365,97 @@ def translate(function: Any, argument_types: tuple[Any, ...], first_order: bool)
     made.compile(argument_types)
     found = made.overloads[argument_types]
     return made.targetdescr.target_context, found.fndesc, found.library
+
+
+@global_compiler_lock
+def linked_bitcode(kernel: Any) -> bytes:
+    """Bitcode of a kernel with all that it calls, with an entry point in C's calling convention."""
+    collecting = gc.isenabled()
+    gc.disable()  # millions of small objects and hardly any garbage: collection takes a fifth of the time
+    try:
+        context, description, library = translate(kernel.function, _argument_types(kernel), kernel.first_order)
+    finally:
+        if collecting:
+            gc.enable()
+    entry = (
+        _kernel_entry(context, description)
+        if kernel.signature is None
+        else _formula_entry(context, description, kernel)
+    )
+    module = binding.parse_assembly(entry)
+    for text in library.modules():
+        part = binding.parse_assembly(text)
+        for function in part.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"  # some occur in several texts
+        module.link_in(part)
+    for function in module.functions:
+        if not function.is_declaration and function.name != ENTRY_NAME:
+            function.linkage = "internal"  # not called from outside: they may be inlined and removed
+    return bytes(module.as_bitcode())
+
+
+def _argument_types(kernel: Any) -> tuple[Any, ...]:
+    if kernel.signature is not None:
+        return tuple(number_type(x, kernel.first_order) for x in kernel.parameters)
+    return tuple(
+        reference(x) if isinstance(x, Struct | Array) else types.int64 if x is int else types.float64
+        for x in kernel.parameters
+    )
+
+
+def _kernel_entry(context: Any, description: Any) -> str:
+    """Function that calls the kernel's, and returns its number; `FAILED` if that raised an error."""
+    module = context.create_module("entry")
+    of = context.call_conv.get_function_type(description.restype, description.argtypes)
+    callee = ir.Function(module, of, description.llvm_func_name)
+    returns = ir.DoubleType() if description.restype == types.float64 else INTEGER
+    given = [context.get_value_type(x) for x in description.argtypes]
+    entry = ir.Function(module, ir.FunctionType(returns, given), ENTRY_NAME)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    status, found = context.call_conv.call_function(
+        builder, callee, description.restype, description.argtypes, entry.args
+    )
+    if isinstance(description.restype, types.NoneType):
+        found = returns(0)
+    elif found.type != returns:
+        found = context.cast(builder, found, description.restype, types.int64)
+    failed = returns(float("nan") if returns == ir.DoubleType() else FAILED)
+    builder.ret(builder.select(status.is_error, failed, found))
+    return str(module)
+
+
+def _formula_entry(context: Any, description: Any, code: Any) -> str:
+    """Function that calls a formula on numbers in memory: see `numba_target`; nan if that raised an error.
+
+    Raises
+    ------
+    TypeError
+        If its result is not nested as that of its signature.
+    """
+    if (found := nested_lengths(description.restype)) != code.signature.result:
+        raise TypeError(
+            f"the lengths of its result are {found or description.restype}, not {code.signature.result} (0: a number)"
+        )
+    module = context.create_module("entry")
+    of = context.call_conv.get_function_type(description.restype, description.argtypes)
+    callee = ir.Function(module, of, description.llvm_func_name)
+    number = number_type(0, code.first_order)
+    address = context.get_data_type(number).as_pointer()
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [address, address]), ENTRY_NAME)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    given = [
+        x for t in description.argtypes for x in tuple_leaves(builder, t, ir.Constant(context.get_value_type(t), None))
+    ]
+    taken = load_numbers(builder, number, entry.args[0], len(given))
+    args = [nested_value(context, builder, t, taken) for t in description.argtypes]
+    status, found = context.call_conv.call_function(builder, callee, description.restype, description.argtypes, args)
+    results = list(tuple_leaves(builder, description.restype, found))
+    nan = context.get_constant(number, float("nan"))
+    with builder.if_else(status.is_error) as (failed, well):
+        with failed:
+            store_numbers(context, builder, number, ((number, nan) for _ in results), entry.args[1])
+        with well:
+            store_numbers(context, builder, number, iter(results), entry.args[1])
+    builder.ret_void()
+    return str(module)

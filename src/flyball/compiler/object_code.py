@@ -12,7 +12,6 @@ announced before they begin.
 from __future__ import annotations
 
 import contextlib
-import gc
 import hashlib
 import os
 import re
@@ -28,8 +27,7 @@ from threading import Lock
 from typing import Any, NamedTuple
 
 from ..errors import PerformanceNotice, warn_user
-from .formulas import LOCK, PACKAGE, register_all
-from .struct_layout import Array, Struct
+from .formulas import ENTRY_NAME, LOCK, PACKAGE, register_all
 
 BASELINES = {"x86-64-v3": ("avx2", "bmi2", "f16c", "fma", "lzcnt", "movbe"), "x86-64-v2": ("sse4.2", "popcnt", "ssse3")}
 """Processors that code is made for, the best first, with the LLVM features that identify them."""
@@ -130,8 +128,6 @@ class LoadedCode:
         return int(self._engine.get_function_address(name))
 
 
-FAILED = -(2**63)  # result of a kernel if one of its formulas raised an error
-ENTRY_NAME = "flyball_kernel"  # the name of a kernel's entry point in its object
 _started: list[bool] = []
 OPTIMIZATION_LEVEL = 3
 """LLVM's optimisation level: 1 and 2 take a second less of twenty, and run 5 to 15 % longer."""
@@ -150,10 +146,9 @@ def compile_kernel(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list
     """
     with LOCK:
         start_compiler()
-        from numba.core.compiler_lock import global_compiler_lock
+        from .numba_target import linked_bitcode
 
-        with global_compiler_lock:
-            code = _linked_bitcode(kernel)
+        code = linked_bitcode(kernel)
         modules = [llvm_binding().parse_bitcode(code) for _ in cpus]
         pairs = zip(cpus, modules, strict=True)
         return [
@@ -169,114 +164,7 @@ def start_compiler() -> None:
             from . import numba_target
 
             _started.append(True)
-            numba_target.register_types()
             register_all(numba_target.overload)
-
-
-def _linked_bitcode(kernel: Any) -> bytes:
-    """Bitcode of a kernel with all that it calls, with an entry point in C's calling convention."""
-    from .numba_target import translate
-
-    collecting = gc.isenabled()
-    gc.disable()  # millions of small objects and hardly any garbage: collection takes a fifth of the time
-    try:
-        context, description, library = translate(kernel.function, _argument_types(kernel), kernel.first_order)
-    finally:
-        if collecting:
-            gc.enable()
-    entry = (
-        _kernel_entry(context, description)
-        if kernel.signature is None
-        else _formula_entry(context, description, kernel)
-    )
-    module = llvm_binding().parse_assembly(entry)
-    for text in library.modules():
-        part = llvm_binding().parse_assembly(text)
-        for function in part.functions:
-            if not function.is_declaration:
-                function.linkage = "linkonce_odr"  # some occur in several texts
-        module.link_in(part)
-    for function in module.functions:
-        if not function.is_declaration and function.name != ENTRY_NAME:
-            function.linkage = "internal"  # not called from outside: they may be inlined and removed
-    return bytes(module.as_bitcode())
-
-
-def _argument_types(kernel: Any) -> tuple[Any, ...]:
-    from numba import types
-
-    from .numba_target import number_type, reference
-
-    if kernel.signature is not None:
-        return tuple(number_type(x, kernel.first_order) for x in kernel.parameters)
-    return tuple(
-        reference(x) if isinstance(x, Struct | Array) else types.int64 if x is int else types.float64
-        for x in kernel.parameters
-    )
-
-
-def _kernel_entry(context: Any, description: Any) -> str:
-    """Function that calls the kernel's, and returns its number; `FAILED` if that raised an error."""
-    from llvmlite import ir
-    from numba.core import types
-
-    module = context.create_module("entry")
-    of = context.call_conv.get_function_type(description.restype, description.argtypes)
-    callee = ir.Function(module, of, description.llvm_func_name)
-    returns = ir.DoubleType() if description.restype == types.float64 else ir.IntType(64)
-    given = [context.get_value_type(x) for x in description.argtypes]
-    entry = ir.Function(module, ir.FunctionType(returns, given), ENTRY_NAME)
-    builder = ir.IRBuilder(entry.append_basic_block("entry"))
-    status, found = context.call_conv.call_function(
-        builder, callee, description.restype, description.argtypes, entry.args
-    )
-    if isinstance(description.restype, types.NoneType):
-        found = returns(0)
-    elif found.type != returns:
-        found = context.cast(builder, found, description.restype, types.int64)
-    failed = returns(float("nan") if returns == ir.DoubleType() else FAILED)
-    builder.ret(builder.select(status.is_error, failed, found))
-    return str(module)
-
-
-def _formula_entry(context: Any, description: Any, code: Any) -> str:
-    """Function that calls a formula on numbers in memory: see `numba_target`; nan if that raised an error.
-
-    Raises
-    ------
-    TypeError
-        If its result is not nested as that of its signature.
-    """
-    from llvmlite import ir
-
-    from .numba_target import load_numbers, nested_lengths, nested_value, number_type, store_numbers, tuple_leaves
-
-    if (found := nested_lengths(description.restype)) != code.signature.result:
-        raise TypeError(
-            f"the lengths of its result are {found or description.restype}, not {code.signature.result} (0: a number)"
-        )
-    module = context.create_module("entry")
-    of = context.call_conv.get_function_type(description.restype, description.argtypes)
-    callee = ir.Function(module, of, description.llvm_func_name)
-    number = number_type(0, code.first_order)
-    address = context.get_data_type(number).as_pointer()
-    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [address, address]), ENTRY_NAME)
-    builder = ir.IRBuilder(entry.append_basic_block("entry"))
-    given = [
-        x for t in description.argtypes for x in tuple_leaves(builder, t, ir.Constant(context.get_value_type(t), None))
-    ]
-    taken = load_numbers(builder, number, entry.args[0], len(given))
-    args = [nested_value(context, builder, t, taken) for t in description.argtypes]
-    status, found = context.call_conv.call_function(builder, callee, description.restype, description.argtypes, args)
-    results = list(tuple_leaves(builder, description.restype, found))
-    nan = context.get_constant(number, float("nan"))
-    with builder.if_else(status.is_error) as (failed, well):
-        with failed:
-            store_numbers(context, builder, number, ((number, nan) for _ in results), entry.args[1])
-        with well:
-            store_numbers(context, builder, number, iter(results), entry.args[1])
-    builder.ret_void()
-    return str(module)
 
 
 def compile_timed(kernel: Any, cpus: tuple[str, ...]) -> tuple[list[bytes], float]:
@@ -298,6 +186,7 @@ COSTS: dict[str, tuple[str, float]] = {
     "mode_kernel": ("what happens at events", 3.2),
     "explicit_steps": ("explicit methods", 2.1),
     "variation_kernel": ("sensitivities of motions", 4.5),
+    "record_motion_kernel": ("energies and errors of motions", 1.1),
     "between": ("contact of all shapes", 9.0),
     "between_convex": ("contact of convex shapes", 2.3),
     "between_planar": ("contact in the plane", 1.3),

@@ -363,7 +363,7 @@ def sparsity_and_groups(s: Structure, width: int, S: System) -> tuple[Any, np.nd
 
     Velocities of one group affect no common residual. ``width`` is the number of residuals.
     """
-    return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, width, S))
+    return s.cache.get("sparsity", None, 1, lambda: _sparsity(s, width, S))
 
 
 def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:

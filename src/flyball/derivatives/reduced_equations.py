@@ -99,8 +99,8 @@ class FreeCoordinates:
     chosen: np.ndarray
     chosen_v: np.ndarray
     scale: np.ndarray
-    left: np.ndarray  # (f, nv): selects the changes of the chosen coordinates
-    left_v: np.ndarray  # the same for velocities
+    position_selector: np.ndarray  # (f, nv): selects the changes of the chosen coordinates
+    velocity_selector: np.ndarray  # the same for velocities
     on_positions: np.ndarray  # (m,): True for constraints on positions
 
     @property
@@ -112,7 +112,12 @@ class FreeCoordinates:
         """The same motions turned by T (nv, nv), with the constraints of a later time."""
         other = free_coordinates(later_equations)
         back = np.linalg.inv(T)
-        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ back, "left_v": self.left_v @ back}
+        bases = {
+            "Z": T @ self.Z,
+            "Zv": T @ self.Zv,
+            "position_selector": self.position_selector @ back,
+            "velocity_selector": self.velocity_selector @ back,
+        }
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
     def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
@@ -123,18 +128,18 @@ class FreeCoordinates:
     def dependent_positions(self, right: np.ndarray) -> np.ndarray:
         """See `FreeMotions`."""
         x = -self.solve(right, self.holonomic)
-        return x - self.Z @ (self.left @ x)
+        return x - self.Z @ (self.position_selector @ x)
 
     def dependent_velocities(self, right: np.ndarray) -> np.ndarray:
         """See `FreeMotions`."""
         if not right.any():
             return np.zeros((len(self.scale), right.shape[1]))
         u = -self.solve(right)
-        return u - self.Zv @ (self.left_v @ u)
+        return u - self.Zv @ (self.velocity_selector @ u)
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
         """See `FreeMotions`."""
-        return self.left @ x
+        return self.position_selector @ x
 
 
 def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None) -> FreeCoordinates:
@@ -454,14 +459,14 @@ class TurningFrame:
         Generator of the turning of co-moving changes of positions and velocities.
     N : ndarray (nv, nv) [1/s]
         (rate of a change of position) = (change of velocity) + N (change of position).
-    told : str
+    description : str
         Description for messages and reports; empty at rest.
     """
 
     turning: np.ndarray
     H: np.ndarray
     N: np.ndarray
-    told: str = ""
+    description: str = ""
 
 
 def reduced_equations(
@@ -491,7 +496,9 @@ def reduced_equations(
     size = abs(M @ H) @ abs(c.u) + abs(D) @ abs(c.u) + abs(K) @ abs(c.x) + abs(M) @ abs(c.known)
     size += abs(e.by_state[r]) @ abs(c.z)
     law_terms = abs(S) @ abs(c.x) + abs(T) @ abs(c.u) + abs(Z) @ abs(c.z)
-    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.left) @ (abs(c.u) + abs(turning) @ abs(c.x)), size, law_terms, Y, M)
+    terms = TermSizes(
+        Y.T @ M @ f.Zv, abs(f.position_selector) @ (abs(c.u) + abs(turning) @ abs(c.x)), size, law_terms, Y, M
+    )
     forces, rates = Y.T @ (M @ c.known + others), np.where(e.sampled[:, None], 0.0, laws)
     try:
         doubt = remove_rounding(terms, c.a_dot, forces, rates, e, f)

@@ -59,7 +59,7 @@ def candidate_frames(x: MechanismState) -> list[TurningFrame]:
     A = np.vstack([-_cross_product_matrix(u) for u in [*(v / length), *w]])
     right = np.r_[(a / length).ravel(), alpha.ravel()]
     p = fundamental_subspaces(A, TURNING_TOLERANCE)
-    least, open_ = p.seen @ ((p.span.T @ right) / p.values), p.null.T
+    least, open_ = p.row_space @ ((p.span.T @ right) / p.values), p.null.T
     turns = [least]
     for spin in w:
         other = least + open_.T @ (open_ @ (spin - least))

@@ -98,7 +98,7 @@ def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Wo
 def pooled_work(structure: Structure, system: System, dtype: Any) -> PooledBuffer:
     """Workspace for one run, as a pooled buffer for compiled code."""
     key = np.dtype(dtype).char, int(system.flat[SCRATCH])
-    made = structure.kept.get(
+    made = structure.cache.get(
         "scratch", key, MAX_KEPT_LAYOUTS, lambda: StructPool(zero_work(structure, system, dtype))
     ).new()
     initialise_work(structure, system, made.array)
@@ -112,7 +112,7 @@ def initialise_work(structure: Structure, system: System, array: Callable[[str],
         array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
     if n := system.sizes.ground_frames:
         frames = system.frames  # passed by address
-        _, at_rest = structure.kept.get(
+        _, at_rest = structure.cache.get(
             "ground", id(frames), MAX_KEPT_LAYOUTS, lambda: (frames, ground_records(system))
         )
         array("FK")[:n] = at_rest
@@ -120,13 +120,13 @@ def initialise_work(structure: Structure, system: System, array: Callable[[str],
 
 def struct_tables(structure: Structure, system: System) -> StructBuffer:
     """Tables as a struct buffer for compiled code."""
-    return structure.kept.get(
+    return structure.cache.get(
         "written", id(system), MAX_KEPT_LAYOUTS, lambda: _new_struct_tables(structure, system)
     )  # the buffer keeps this address alive
 
 
 def _new_struct_tables(structure: Structure, system: System) -> StructBuffer:
-    first = structure.kept.get("written first", None, 1, lambda: StructBuffer(system))
+    first = structure.cache.get("written first", None, 1, lambda: StructBuffer(system))
     return first.of(system)
 
 
@@ -160,7 +160,7 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
     return Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
         z(len(system.column)), z(len(system.column)),
-        z(len(structure.terms) if structure.loads or structure.reads else 0, 6),
+        z(len(structure.terms) if structure.loads or structure.sensed_columns else 0, 6),
         RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
         z(INVERSE_JACOBIAN + nl, 2 * len(structure.measured) + nl + ne + nc + nw),
         Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]

@@ -547,7 +547,7 @@ class SmoothLoop:
             own = _engine_arguments(ny, width, clock.seen)
             self.own, doors = StructBuffer(own, R), own.doors
         else:
-            mould = s.kept.get(
+            mould = s.cache.get(
                 "own desk",
                 (ny, width),
                 MAX_LOOP_LAYOUTS,

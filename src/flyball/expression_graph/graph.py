@@ -92,7 +92,7 @@ class Function:
         **details: Any,
     ) -> None:
         self.name, self.python, self._derivatives = name, python, derivatives
-        self.told = details  # data for printers
+        self.details = details  # data for printers
 
     def __call__(self, *args: Any) -> Any:
         """Value for numbers; element by element for arrays."""
@@ -101,9 +101,9 @@ class Function:
         return self.python(*args)
 
     @property
-    def shown(self) -> str:
+    def printed_name(self) -> str:
         """Printed name; derivatives of a table have primes."""
-        return self.name + "'" * self.told.get("order", 0)
+        return self.name + "'" * self.details.get("order", 0)
 
     def derivative(self, k: int) -> Function:
         """Derivative by the k-th argument."""
@@ -174,7 +174,7 @@ def spline_derivatives(data: list[float], moved: list[int], at: int, name: str) 
     zero = Function("zero", lambda *args: 0.0 * args[0], lambda k: zero, constant=0.0)
     for order in range(SPLINE_ORDERS):
         made.append(Function(name, of(order), next_of(order), table=data, moved=moved, order=order, at=at))
-        made[order].told["value"] = made[0]
+        made[order].details["value"] = made[0]
     return made
 
 

@@ -43,7 +43,7 @@ class Screw(Joint):
         "displacement": Coordinate(SLIDE, offset="displacement"),
     }
     chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("R", coordinate="angle"))
-    kept: ClassVar = blocks[-1:]
+    remaining_rows: ClassVar = blocks[-1:]
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     symbol: ClassVar[str] = "screw"

@@ -201,7 +201,7 @@ def _singular_start_error(found: Mobility) -> SingularityError | None:
         return None
     free = c.structure.model.copy()
     free.drivers = []
-    loose = compile_mechanism(free, parameters=c.values.told)
+    loose = compile_mechanism(free, parameters=c.values.parameter_values)
     loose.follow(c.hints)
     released = mobility(free, Assembly(loose, a.t, a.q, a.v))
     ranks = []

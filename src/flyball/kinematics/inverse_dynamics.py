@@ -72,8 +72,8 @@ class Determinacy:
 def determinacy(result: Result) -> Determinacy:
     """Return the self-stresses at every output time of a motion."""
     out = Determinacy(len(result.t))
-    own = compile_mechanism(result.model, parameters=result.values.told, tree=result.values.structure.tree)
-    base = own if not own.structure.tree else compile_mechanism(result.model, parameters=own.values.told)
+    own = compile_mechanism(result.model, parameters=result.values.parameter_values, tree=result.values.structure.tree)
+    base = own if not own.structure.tree else compile_mechanism(result.model, parameters=own.values.parameter_values)
     if not len(base.structure.rows) or not len(result.t):
         return out
     states = absolute_states(result, own, base)

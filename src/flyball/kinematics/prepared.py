@@ -83,7 +83,7 @@ class Prepared:
     @property
     def parameters(self) -> dict[str, float]:
         """Values of its parameters [SI]."""
-        return self._start.compiled.values.told
+        return self._start.compiled.values.parameter_values
 
     def simulate(self, t_end: float | str, **options: Any) -> Result:
         """Simulate as `Mechanism.simulate` in these coordinates, with these parameter values.

@@ -613,16 +613,16 @@ _SHAPES = {"step": "cubic", "step5": "quintic"}
 def _expand(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
     """Rewrite steps and powers with a varying exponent in terms of simpler operations."""
 
-    def made(kind: str, *args: SyntaxNode) -> SyntaxNode:
+    def syntax_node(kind: str, *args: SyntaxNode) -> SyntaxNode:
         return SyntaxNode(kind, args, None, node.start, node.stop)
 
     args = tuple(_expand(arg, varying) for arg in node.args)
     if node.kind in _SHAPES:
         x, x0, y0, x1, y1 = args
-        s = made("/", made("-", x, x0), made("-", x1, x0))
-        s = made("min", made("max", s, SyntaxNode("number", value=0.0)), SyntaxNode("number", value=1.0))
-        shape = made(_SHAPES[node.kind], s)
-        return made("+", y0, made("*", made("-", y1, y0), shape))
+        s = syntax_node("/", syntax_node("-", x, x0), syntax_node("-", x1, x0))
+        s = syntax_node("min", syntax_node("max", s, SyntaxNode("number", value=0.0)), SyntaxNode("number", value=1.0))
+        shape = syntax_node(_SHAPES[node.kind], s)
+        return syntax_node("+", y0, syntax_node("*", syntax_node("-", y1, y0), shape))
     if node.kind == "**" and any(n.kind == "name" and n.value in varying for n in args[1].walk()):
-        return made("exp", made("*", made("log", args[0]), args[1]))
+        return syntax_node("exp", syntax_node("*", syntax_node("log", args[0]), args[1]))
     return SyntaxNode(node.kind, args, node.value, node.start, node.stop)

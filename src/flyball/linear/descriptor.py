@@ -171,7 +171,7 @@ class SparseEquations:
             found._refuse_changing()
         return found
 
-    def freed(self, way: np.ndarray) -> np.ndarray:
+    def admissible_change(self, way: np.ndarray) -> np.ndarray:
         """Project a change of positions onto the motions that the constraints allow."""
         G = self.pencil.G
         along = way / self.scale
@@ -182,7 +182,7 @@ class SparseEquations:
         found = []
         for k in nonsmooth_points(self.e, to):
             ways = [self.scale**2 * part for part in k.along[:2]]  # steepest direction, in scaled units
-            dq, dv = (self.freed(way) for way in ways)
+            dq, dv = (self.admissible_change(way) for way in ways)
             if k.is_crossed_by(np.stack([dq, 0.0 * dq], 1), np.stack([0.0 * dv, dv], 1)):
                 found.append(k)
         if found:

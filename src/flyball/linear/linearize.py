@@ -258,7 +258,7 @@ def _reduction_at(
     refuse_nonsmooth(e, dq, dv, dz, to=to)
     still = np.zeros((len(x.v),) * 2)
     frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x)) if frozen else steady_frame(x, e, f)
-    frame.told = frame_description(x, frame, frozen)
+    frame.description = frame_description(x, frame, frozen)
     return e, f, frame
 
 
@@ -350,7 +350,7 @@ def _linear_model(
         dense,
         sparse,
         np.zeros(3) if frame is None else frame.turning,
-        "" if frame is None else frame.told,
+        "" if frame is None else frame.description,
         period,
     )
 

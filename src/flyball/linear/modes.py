@@ -84,7 +84,7 @@ def _with_eigenvalue_data(
     found: Modes, eigenvalues: Spectrum, one: np.ndarray, rest: np.ndarray, frame: TurningFrame
 ) -> Modes:
     """Add multiplicities, residual, frame and growth to the modes."""
-    found.turning, found.seen_from = frame.turning, frame.told
+    found.turning, found.seen_from = frame.turning, frame.description
     found.multiplicity, found.geometric_multiplicity = eigenvalues.multiplicity[one], eigenvalues.geometric[one]
     found.residual = eigenvalues.residual
     found.growing = bool(is_growing(eigenvalues.values[rest]).any())

@@ -23,7 +23,7 @@ from ..model.element import Element
 from ..model.expressions import number
 from ..model.model import Model
 from ..model.unsupported_elements import unsupported_elements
-from ..results.equilibrium import ABOUT_TO_PART, AT_FRICTION_LIMIT, NOT_JUDGED, Equilibrium, Touch
+from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, NOT_JUDGED, Equilibrium, Touch
 from ..results.result import Result
 from ..simulation.initial_state import choose_coordinates, find_initial_state
 from ..statics.closed_contacts import find_closed_contacts
@@ -208,7 +208,7 @@ def moving_error(model: Model, analysis: str) -> ModelError:
 
 
 def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
-    """Notes on contacts that are about to part.
+    """Notes on contacts that are about to open.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
             t,
             limit,
         )
-    parting = [k.name for k in touches if k.state == ABOUT_TO_PART]
+    parting = [k.name for k in touches if k.state == ABOUT_TO_OPEN]
     return (f"{', '.join(parting)} about to open: the results are valid while it stays closed",) if parting else ()
 
 

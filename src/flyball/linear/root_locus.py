@@ -53,7 +53,7 @@ class EigenvalueSample:
         Eigenvalues with rounding removed, and as computed.
     shapes : ndarray (2 nv + nz, n) complex
         Unit vectors of changes of positions, velocities and controller states, in natural units.
-    told : str
+    frame : str
         Description of the frame that they refer to.
     """
 
@@ -62,7 +62,7 @@ class EigenvalueSample:
     w: np.ndarray
     raw: np.ndarray
     shapes: np.ndarray
-    told: str
+    frame: str
 
     @cached_property
     def kinds(self) -> np.ndarray:
@@ -77,7 +77,7 @@ class EigenvalueSample:
         return np.where(w == 0.0, "zero", np.where(w.imag == 0.0, alone, np.where(w.imag > 0.0, pair, "")))
 
     @cached_property
-    def sides(self) -> np.ndarray:
+    def half_planes(self) -> np.ndarray:
         """Half plane of each eigenvalue, (n,): 1 (right), -1 (left), or 0 (imaginary axis)."""
         return half_plane(self.w)
 
@@ -104,7 +104,7 @@ def eigenvalue_sample(
     shapes = np.vstack([*parts, r.states[:, :n] / r.changes[:, None]])
     shapes = shapes @ own.vectors
     shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
-    return EigenvalueSample(place, value, own.values, own.raw, shapes, frame.told)
+    return EigenvalueSample(place, value, own.values, own.raw, shapes, frame.description)
 
 
 def matching_branches(a: EigenvalueSample, b: EigenvalueSample) -> np.ndarray:
@@ -128,7 +128,7 @@ def crosses_axis(samples: Sequence[EigenvalueSample]) -> np.ndarray:
     branch = [np.arange(len(samples[0].w))]
     for a, b in pairwise(samples):
         branch.append(matching_branches(a, b)[branch[-1]])
-    sides = np.array([x.sides[k] for x, k in zip(samples, branch, strict=True)])
+    sides = np.array([x.half_planes[k] for x, k in zip(samples, branch, strict=True)])
     real = np.array([x.raw.real[k] for x, k in zip(samples, branch, strict=True)])
     place = np.array([x.place for x in samples])
     out = np.zeros(len(samples), bool)
@@ -550,7 +550,7 @@ def _write_branches(done: RootLocus, samples: Sequence[EigenvalueSample]) -> Non
     done.path, done.path_values = np.array(rows), np.array([x.value for x in order])
     given = [k for k, x in enumerate(order) if x.place == int(x.place)]
     done.values, done.eigenvalues = done.path_values[given], done.path[given]
-    done.seen_from = tuple(dict.fromkeys(x.told for x in order if x.told))
+    done.seen_from = tuple(dict.fromkeys(x.frame for x in order if x.frame))
 
 
 def _is_meeting(base: EigenvalueSample, x: EigenvalueSample, following: Sequence[EigenvalueSample]) -> bool:

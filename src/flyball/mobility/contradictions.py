@@ -157,7 +157,7 @@ def _coordinate_not_moved(case: ContradictionCase, name: str, holding: list[str]
     c = case.c
     loose = c.structure.model.copy()
     loose.drivers, loose.initial = [], []
-    own = compile_mechanism(loose, parameters=c.values.told)
+    own = compile_mechanism(loose, parameters=c.values.parameter_values)
     own.follow(c.hints)
     a = Assembly(own, case.t, case.q, case.v)
     own.at(case.t, case.q, case.v)

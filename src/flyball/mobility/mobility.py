@@ -86,7 +86,7 @@ def _candidate_coordinates(a: Assembly) -> tuple[list[str], Any]:
     measuring = model.copy()
     measuring.initial = [Initial(name=name, value=0.0) for name in names]
     held = dict.fromkeys(names, 0.0)
-    probe = compile_mechanism(measuring, parameters=own.values.told, holds=measuring.initial, held=held)
+    probe = compile_mechanism(measuring, parameters=own.values.parameter_values, holds=measuring.initial, held=held)
     probe.follow(own.hints)
     probe.at(a.t, a.q, a.v)
     G = probe.sparse_jacobian()
@@ -233,7 +233,7 @@ def nearby_positions(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
     model = c.structure.model
     near = c
     if not all(r.holonomic for r in c.structure.rows):
-        near = compile_mechanism(model, parameters=c.values.told, positions=True)
+        near = compile_mechanism(model, parameters=c.values.parameter_values, positions=True)
         near.follow(c.hints)
     scale = velocity_scales(c)
     random = np.random.default_rng(1)
@@ -265,7 +265,7 @@ def _position_distance(c: CompiledMechanism, q: np.ndarray, start: np.ndarray) -
 
 def _perturbed_rank(a: Assembly) -> int:
     """Return the rank with slightly and randomly perturbed joint frames."""
-    c = compile_mechanism(a.compiled.structure.model, parameters=a.compiled.values.told)
+    c = compile_mechanism(a.compiled.structure.model, parameters=a.compiled.values.parameter_values)
     s = c.structure
     S = c.values.system
     frames = Frames(S.frames.position.copy(), S.frames.rotation.copy())

@@ -227,7 +227,7 @@ def _independent_part(found: np.ndarray, P: np.ndarray) -> np.ndarray:
     if not found.shape[1]:
         return P
     rest = P - found @ (found.T @ P)
-    return P @ fundamental_subspaces(rest, INDEPENDENCE_TOLERANCE, 1.0).seen
+    return P @ fundamental_subspaces(rest, INDEPENDENCE_TOLERANCE, 1.0).row_space
 
 
 def _support_size(blocks: list[np.ndarray]):

@@ -57,7 +57,7 @@ class CandidateChange(NamedTuple):
     block: np.ndarray
 
     @property
-    def freed(self) -> int:
+    def released_rows(self) -> int:
         """Number of rows that it releases."""
         return self.block.shape[1]
 
@@ -117,8 +117,8 @@ class Combination(NamedTuple):
 def _by_released_rows(items: Sequence[CandidateChange]) -> dict[int, tuple[list[int], np.ndarray]]:
     """Return, by number of released rows, the numbers of the items and their blocks (items, positions, f, s)."""
     out = {}
-    for f in sorted({i.freed for i in items}):
-        numbers = [k for k, i in enumerate(items) if i.freed == f]
+    for f in sorted({i.released_rows for i in items}):
+        numbers = [k for k, i in enumerate(items) if i.released_rows == f]
         out[f] = numbers, np.stack([items[k].block for k in numbers])
     return out
 
@@ -194,7 +194,7 @@ def possible_replacements(
 ) -> dict[str, list[Replacement]]:
     """Return the possible replacements of each element, unchanged first, then by cost, from one compilation."""
     own = spaces.assembly.compiled
-    model, env = own.structure.model, own.values.told
+    model, env = own.structure.model, own.values.parameter_values
     probe = model.copy()
     found: dict[str, list[tuple[str, Joint]]] = {name: [] for name in names}
     directions = _candidate_directions(model, names, env)

@@ -37,7 +37,7 @@ class Touch(TwoFrameForce):
         F and M in the world in the reference configuration: origin, rotation row by row.
     gap : tuple of 9 numbers
         The row of the distance between the sides: its kind, its parameters.
-    seen : tuple of 9 numbers
+    measured : tuple of 9 numbers
         The row that is monitored while the contact is open, if it is a different one.
     slips : tuples of 9 numbers
         The rows of the sliding velocities, one in the plane and two in space; none without friction.
@@ -48,7 +48,7 @@ class Touch(TwoFrameForce):
 
     frames: tuple[tuple[float, ...], tuple[float, ...]]
     gap: Term
-    seen: Term | None = None
+    measured: Term | None = None
     slips: tuple[Term, ...] = ()
     friction: tuple[float, float] = (0.0, 0.0)
     restitution: float = 0.0
@@ -82,12 +82,12 @@ class Touch(TwoFrameForce):
 
     def switches(self) -> tuple[Switch, ...]:
         """Return the gap switch, and a slip switch for each tangent."""
-        seen = () if self.seen is None else (("F", "M", _row(self.seen)),)
-        out = [Switch(GAP, "gap", path=(("F", "M", _row(self.gap)),), seen=seen)]
+        seen = () if self.measured is None else (("F", "M", _row(self.measured)),)
+        out = [Switch(GAP, "gap", path=(("F", "M", _row(self.gap)),), measured=seen)]
         for k, slip in enumerate(self.slips):
             path = (("F", "M", _row(slip, holonomic=False)),)
             out.append(Switch(SLIP, f"slip_{k + 1}", path=path, slides=k == 0, other="gap"))
-        if self.seen is not None:
+        if self.measured is not None:
             margin = (corner_on_box.KIND_MARGIN, *self.gap[1:])
             out.append(Switch(EDGE, "edge", path=(("F", "M", _row(margin)),), other="gap"))
         return tuple(out)

@@ -184,7 +184,7 @@ def controller_states(model: Model) -> list[ConnectedState]:
         If signals of sampled controllers depend on each other in a loop.
     """
     return (
-        model.kept.get("wired", None, 1, lambda: _controller_states(model))
+        model.cache.get("wired", None, 1, lambda: _controller_states(model))
         if model.frozen
         else _controller_states(model)
     )
@@ -194,12 +194,12 @@ def _controller_states(model: Model) -> list[ConnectedState]:
     wiring = _signal_graph(model)
     every = controllers_by_name(model).values()
 
-    def made(e: Controller, name: str, text: str, signal: bool = False) -> ConnectedState:
+    def connected_state(e: Controller, name: str, text: str, signal: bool = False) -> ConnectedState:
         return ConnectedState(e, name, Expression(text, wiring.template(e, text), None, f"{name} of {e.title}"), signal)
 
-    rates = [made(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
-    held = [made(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
-    later = [made(e, x.name, x.law) for e in every if e.sampled for x in wiring.states[e.name]]
+    rates = [connected_state(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
+    held = [connected_state(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
+    later = [connected_state(e, x.name, x.law) for e in every if e.sampled for x in wiring.states[e.name]]
     return [*rates, *_in_order(held), *later]
 
 
@@ -249,7 +249,7 @@ def controller_names(model: Model, e: Controller) -> list[str]:
 
 
 def _signal_graph(model: Model) -> _SignalGraph:
-    return model.kept.get("wiring", None, 1, lambda: _SignalGraph(model)) if model.frozen else _SignalGraph(model)
+    return model.cache.get("wiring", None, 1, lambda: _SignalGraph(model)) if model.frozen else _SignalGraph(model)
 
 
 class _SignalGraph:

@@ -36,7 +36,7 @@ class Action:
         return ""
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Return a description of what it does."""
         return f"{type(self).__name__} {self.about()}".strip()
 
@@ -270,11 +270,11 @@ class Event(Element):
         return LawOf(None, curves=True, forces=True)
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Return a description of its condition and actions."""
         way = "" if self.at_start or self.direction == "rising" else f" ({self.direction})"
         often = "" if self.times is None else f", at most {self.times} times" if self.times > 1 else ", once"
-        return f"{self.when}{way}{often}: {', '.join(a.told for a in self.do) or 'noted'}"
+        return f"{self.when}{way}{often}: {', '.join(a.description for a in self.do) or 'noted'}"
 
     def laws(self) -> tuple[tuple[str, Law], ...]:
         """Return all its expressions: location, and text as written."""

@@ -120,7 +120,7 @@ def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
     quantities: dict[str, tuple[float, int]] = {}
     spare = (c for c in map(chr, range(0x4E00, 0x9FA0)) if c not in text)
 
-    def put(match: re.Match[str]) -> str:
+    def replacement(match: re.Match[str]) -> str:
         inner = match[0].strip()
         parts = split_quantity(inner)
         if parts is None or not parts[1] or _WORDS.search(inner):
@@ -134,7 +134,7 @@ def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
         quantities[name] = value, len(inner)
         return match[0].replace(inner, name.ljust(len(inner)))
 
-    return _ENCLOSED.sub(put, text), quantities
+    return _ENCLOSED.sub(replacement, text), quantities
 
 
 class _Reader:
@@ -171,7 +171,7 @@ class _Reader:
             self.refuse(node, "a comparison is no number", "use it as the condition of where(condition, a, b)")
         return made
 
-    def made(self, node: ast.AST, kind: str, args: Iterable[SyntaxNode] = (), value: Any = None) -> SyntaxNode:
+    def syntax_node(self, node: ast.AST, kind: str, args: Iterable[SyntaxNode] = (), value: Any = None) -> SyntaxNode:
         return SyntaxNode(kind, tuple(args), value, *self.span(node))
 
     def span(self, node: Any) -> tuple[int, int]:
@@ -188,7 +188,7 @@ class _Reader:
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
             self.refuse(node, f"{value!r} is not a finite real number", _ALLOWED)
         exact = isinstance(value, int) and value < 2**53
-        return self.made(node, "number", value=value if exact else float(value))
+        return self.syntax_node(node, "number", value=value if exact else float(value))
 
     def read_Name(self, node: ast.Name) -> SyntaxNode:
         if node.id in self.quantities:
@@ -201,8 +201,8 @@ class _Reader:
         if node.id in self.tables:
             self.refuse(node, f"'{node.id}' is a table", f"give its argument: {node.id}(x)")
         if node.id in CONSTANTS:
-            return self.made(node, "number", value=CONSTANTS[node.id])
-        return self.made(node, "name", value=node.id)
+            return self.syntax_node(node, "number", value=CONSTANTS[node.id])
+        return self.syntax_node(node, "name", value=node.id)
 
     def read_Attribute(self, node: ast.Attribute) -> SyntaxNode:
         """Convert a curve of a part, such as A.angle: a name with a dot."""
@@ -214,16 +214,16 @@ class _Reader:
             text = ast.unparse(node)
             sensor = f"laws use curves by sensors: add fb.Sensor('name', '{text}') and write its name"
             self.refuse(node, f"'{text}' is not allowed in an expression", sensor if named else _ALLOWED)
-        return self.made(node, "name", value=ast.unparse(node))
+        return self.syntax_node(node, "name", value=ast.unparse(node))
 
     def read_UnaryOp(self, node: ast.UnaryOp) -> SyntaxNode:
         if isinstance(node.op, ast.Not):
-            return self.made(node, "not", [self.read(node.operand, condition=True)])
+            return self.syntax_node(node, "not", [self.read(node.operand, condition=True)])
         if isinstance(node.op, ast.UAdd):
             return self.read(node.operand)
         if not isinstance(node.op, ast.USub):
             self.refuse(node, f"the operator of '{ast.unparse(node)}' is not known", _ALLOWED)
-        return self.made(node, "neg", [self.read(node.operand)])
+        return self.syntax_node(node, "neg", [self.read(node.operand)])
 
     def read_BinOp(self, node: ast.BinOp) -> SyntaxNode:
         if type(node.op) not in _BINARY:
@@ -232,7 +232,7 @@ class _Reader:
             remedy = "powers are written with **, as in x**2" if isinstance(node.op, ast.BitXor) else _ALLOWED
             start = self.text.index(symbol, between[0])
             refuse_expression(self.text, start, start + len(symbol), f"the operator '{symbol}' is not known", remedy)
-        return self.made(node, _BINARY[type(node.op)], [self.read(node.left), self.read(node.right)])
+        return self.syntax_node(node, _BINARY[type(node.op)], [self.read(node.left), self.read(node.right)])
 
     def read_Compare(self, node: ast.Compare) -> SyntaxNode:
         terms = [self.read(term) for term in (node.left, *node.comparators)]
@@ -241,12 +241,12 @@ class _Reader:
             if type(op) not in _COMPARE:
                 self.refuse(node, "only <, <=, > and >= can compare", "numbers are seldom exactly equal: use a range")
             kind, swapped = _COMPARE[type(op)]
-            parts.append(self.made(node, kind, (b, a) if swapped else (a, b)))
-        return parts[0] if len(parts) == 1 else self.made(node, "and", parts)
+            parts.append(self.syntax_node(node, kind, (b, a) if swapped else (a, b)))
+        return parts[0] if len(parts) == 1 else self.syntax_node(node, "and", parts)
 
     def read_BoolOp(self, node: ast.BoolOp) -> SyntaxNode:
         parts = [self.read(value, condition=True) for value in node.values]
-        return self.made(node, "and" if isinstance(node.op, ast.And) else "or", parts)
+        return self.syntax_node(node, "and" if isinstance(node.op, ast.And) else "or", parts)
 
     def read_Call(self, node: ast.Call) -> SyntaxNode:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
@@ -263,8 +263,8 @@ class _Reader:
             call = f"{name}({', '.join(wanted)})"
             self.refuse(node, f"wrong arguments: {given} given", f"write {call}, without names")
         if is_table:
-            return self.made(node, "table", [self.read(node.args[0])], name)
-        return self.made(
+            return self.syntax_node(node, "table", [self.read(node.args[0])], name)
+        return self.syntax_node(
             node, name, [self.read(a, condition=name == "where" and i == 0) for i, a in enumerate(node.args)]
         )
 

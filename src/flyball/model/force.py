@@ -209,7 +209,7 @@ class Switch:
         Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity, with weights if there are several.
     path : tuple of (role, role, Row)
         Or terms between frames of the element's own, such as the parts of a rope.
-    seen : tuple of (role, role, Row)
+    measured : tuple of (role, role, Row)
         Terms measured in place of ``path`` while the row is off, if the row itself is not sufficient then.
     other : str
         Label of the element's switch that it depends on: for a slip, the gap.
@@ -224,7 +224,7 @@ class Switch:
     label: str = ""
     along: tuple[str, ...] = ()
     path: tuple[tuple[str, str, Row], ...] = ()
-    seen: tuple[tuple[str, str, Row], ...] = ()
+    measured: tuple[tuple[str, str, Row], ...] = ()
     other: str = ""
     slides: bool = False
     weighted: bool = False

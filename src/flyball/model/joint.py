@@ -72,7 +72,7 @@ class Joint(Element):
     blocks: ClassVar[tuple[Row, ...]] = ()
     coordinates: ClassVar[dict[str, Coordinate]] = {}
     chain: ClassVar[tuple[Primitive, ...] | None] = None  # its free motions, slides first; None: no chain of its own
-    kept: ClassVar[tuple[Row, ...]] = ()  # blocks that its chain does not satisfy by itself
+    remaining_rows: ClassVar[tuple[Row, ...]] = ()  # blocks that its chain does not satisfy by itself
     rest: ClassVar[tuple[tuple[float, ...], ...]] = ()  # axes of M in F (columns) for zero coordinates
     planar_normal: ClassVar[str] = "z"  # joint axis that becomes the normal of the plane; "" if it cannot be planar
     spatial: ClassVar[bool] = True
@@ -107,7 +107,7 @@ class Joint(Element):
 
     def loose(self, planar: bool) -> list[Row]:
         """Return the rows that remain if it is a tree joint."""
-        return [r for r in self.rows(planar) if self.chain is None or r in self.kept]
+        return [r for r in self.rows(planar) if self.chain is None or r in self.remaining_rows]
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by ``at``."""

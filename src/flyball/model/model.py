@@ -54,7 +54,7 @@ class Model:
     """
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
-    kept: ResultCache  # of a snapshot: cached results
+    cache: ResultCache  # of a snapshot: cached results
 
     def __init__(
         self,

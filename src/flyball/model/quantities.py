@@ -64,11 +64,11 @@ Table = dict[str, Quantity]
 
 def quantities(model: Model, name: str) -> Table:
     """Return all quantities of a part (or of ``"energy"``) by name; not to be changed."""
-    kept = getattr(model, "kept", None)  # of a snapshot
+    cache = getattr(model, "cache", None)  # of a snapshot
     return (
         _quantity_table(model, name)
-        if kept is None
-        else kept.get("quantities", name, MOST, lambda: _quantity_table(model, name))
+        if cache is None
+        else cache.get("quantities", name, MOST, lambda: _quantity_table(model, name))
     )
 
 

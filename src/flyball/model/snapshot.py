@@ -103,7 +103,7 @@ def model_copy(model: Model) -> Any:
     """Return a model with lists of its own that can be changed."""
     out = object.__new__(type(model))
     vars(out).update(vars(model))
-    vars(out).pop("kept", None)
+    vars(out).pop("cache", None)
     vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
     vars(out)["gravity"] = copy(model.gravity)  # it may be a list
     vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
@@ -120,10 +120,10 @@ def snapshot(model: Model) -> Any:
     out.environment()  # computed now: nothing is stored in it later
     vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
     vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(_by_name(out))})
-    vars(out).update({"kept": ResultCache(), "frozen": True})
+    vars(out).update({"cache": ResultCache(), "frozen": True})
     if last is not None and _same_parts(model, last):  # other parameter values leave every structure unchanged
-        out.kept.take("spanning", last.kept, lambda tree: tree)
-        out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
+        out.cache.take("spanning", last.cache, lambda tree: tree)
+        out.cache.take("structure", last.cache, lambda s: dataclasses.replace(s, model=out))
     vars(model)["_snapshot"] = out
     return out
 
@@ -145,7 +145,7 @@ def _by_name(model: Model) -> dict[str, Element]:
 
 def picklable_state(state: Mapping[str, Any]) -> dict[str, Any]:
     """Return the pickled state of a model, without cached results."""
-    out = {k: v for k, v in state.items() if k not in ("_snapshot", "kept", "frozen", "_resolved")}
+    out = {k: v for k, v in state.items() if k not in ("_snapshot", "cache", "frozen", "_resolved")}
     out |= {name: list(state[name]) for name in CATEGORIES if name in state}
     return out | {"_resolved": None, "parameters": dict(state["parameters"]), "by_name": dict(state["by_name"])}
 

@@ -177,7 +177,7 @@ def _vertex_cover(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 def minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """Order unknowns by minimum degree; returns the place (n,) of each. Large matrices: Liu (1985), from SuperLU."""
     if n < SMALL_ORDER:
-        return _plain_minimum_degree(n, i, j)
+        return _exact_minimum_degree(n, i, j)
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
@@ -188,7 +188,7 @@ def minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     return np.asarray(lu.perm_c, np.int64)
 
 
-def _plain_minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+def _exact_minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """Eliminate the unknown with the fewest neighbours next; its neighbours become neighbours of each other."""
     near: list[set[int]] = [set() for _ in range(n)]
     for a, b in zip(i.tolist(), j.tolist(), strict=True):

@@ -28,7 +28,7 @@ class FundamentalSubspaces(NamedTuple):
 
     span: np.ndarray  # (n, r): column space
     dependencies: np.ndarray  # (n, n - r): y with y A = 0
-    seen: np.ndarray  # (m, r): row space
+    row_space: np.ndarray  # (m, r): row space
     null: np.ndarray  # (m, m - r): x with A x = 0
     values: np.ndarray  # (r,): nonzero singular values
 

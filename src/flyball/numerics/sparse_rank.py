@@ -177,7 +177,7 @@ def rank_by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
 
     G = sp.csr_matrix(G)
     p = SemidefinitePivots(G @ G.T)
-    basis = p.vectors(p.shown) if max(G.shape) > MAX_DOUBTFUL_SVD_SIZE else p.dependencies(G)
+    basis = p.vectors(p.reported_pivots) if max(G.shape) > MAX_DOUBTFUL_SVD_SIZE else p.dependencies(G)
     return None if basis is None else (int(G.shape[0]) - len(p.weak), basis)
 
 
@@ -202,7 +202,7 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
         Basis of the null space: as many vectors as `ROOM` allows.
     """
     p = SemidefinitePivots(A)
-    return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.shown)
+    return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.reported_pivots)
 
 
 class SemidefinitePivots:
@@ -239,7 +239,7 @@ class SemidefinitePivots:
         self.least = float(np.delete(pivots, self.weak).min(initial=np.inf))
 
     @property
-    def shown(self) -> np.ndarray:
+    def reported_pivots(self) -> np.ndarray:
         """Zero pivots whose null vectors fit into `ROOM`."""
         return self.weak[: max_vectors(len(self.inverse))]
 

@@ -247,9 +247,9 @@ class Contacts:
         slack = 1e-9 * max(high - low, abs(high))
         if not isinstance(t, (int, float, np.number)) or not low - slack <= float(t) <= high + slack:
             raise ModelError(f"contacts: t is {t!r}; it must be a time [s] from {low:g} to {high:g}")
-        return self.taken([int(np.abs(self.t - float(t)).argmin())])
+        return self.at_times([int(np.abs(self.t - float(t)).argmin())])
 
-    def taken(self, times: Sequence[int] | np.ndarray) -> Contacts:
+    def at_times(self, times: Sequence[int] | np.ndarray) -> Contacts:
         """Return the table at some of the output times, by their indices; repeated indices are permitted."""
         times = np.asarray(times, int)
         begin = np.r_[0, np.cumsum(self.count[times])]

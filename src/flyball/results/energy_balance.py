@@ -272,7 +272,7 @@ def budgets_by_part(result: Result) -> list[EnergyBudget]:
     Energies exchanged by impacts and events are not known by parts.
     """
     s, S = result.values.structure, result.values.system
-    part = s.kept.get("connected", None, 1, partial(connected_parts, S))
+    part = s.cache.get("connected", None, 1, partial(connected_parts, S))
     many = int(part.max(initial=0)) + 1
     if many < 2 or result.bulk or not len(result.t):
         return []

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_PART = "sticks", "smooth", "at its friction limit", "about to part"
+STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_OPEN = "sticks", "smooth", "at its friction limit", "about to open"
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,7 @@ def pack_events(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
             told = [np.full(n, np.nan) if m is None else m.values.system.const[:n].real for m in every]
             states[f"events_{k}_parameters"] = np.array(told)
     told = [
-        h.as_dict() | ({"struck": x.plain()} if isinstance(x := h.impulses, EventImpulses) else {})
+        h.as_dict() | ({"struck": x.as_plain_data()} if isinstance(x := h.impulses, EventImpulses) else {})
         for h in result.events
     ]
     return {"events": json.dumps(told)}, states

@@ -128,7 +128,7 @@ class InverseDynamics:
         if axes != "world" and stress is not None:
             R = view.rotation(axes)
             stress = np.concatenate([np.einsum("nji,njk->nik", R, stress[:, i : i + 3]) for i in (0, 3)], axis=1)
-        return self._told(one, stress)
+        return self._unique_wrench(one, stress)
 
     def together(self, *joints: str, on: str) -> Wrench:
         """Return the sum of joint reactions on a body: force, and torque about its mass centre, world axes.
@@ -158,7 +158,7 @@ class InverseDynamics:
                 moved = stress.copy()
                 moved[:, 3:] += np.cross(r[:, :, None] / x.length, stress[:, :3], axis=1)
                 stresses = sign * moved + (0.0 if stresses is None else stresses)
-        return self._told(total, stresses)
+        return self._unique_wrench(total, stresses)
 
     def _joint(self, name: str) -> Joint:
         model = self.result.model
@@ -170,7 +170,7 @@ class InverseDynamics:
     def _stress(self, joint: str) -> np.ndarray | None:
         return self.determinacy.wrenches.get(joint)
 
-    def _told(self, one: np.ndarray, stress: np.ndarray | None) -> Wrench:
+    def _unique_wrench(self, one: np.ndarray, stress: np.ndarray | None) -> Wrench:
         free = np.zeros(one.shape, bool) if stress is None else np.abs(stress).max(axis=2) > STRESS_TOLERANCE
         if self.result.planar:
             free[:, 2:5] = False

@@ -81,13 +81,13 @@ def record_motion(
     """
     n, count, steps = len(result.t), result.health.evaluations, result.health.steps
     s, S, deferred = result.values.structure, result.values.system, result.deferred_accelerations is not None
-    conservative = s.kept.get("conservative", None, 1, lambda: not any(x.endswith(".work") for x in s.states))
+    conservative = s.cache.get("conservative", None, 1, lambda: not any(x.endswith(".work") for x in s.states))
     least_times = steps if conservative and steps <= n else MIN_TIMES  # enough for the time error of a swing
     times = min(n, max(MIN_TIMES, least_times, count // EVALUATIONS_PER_TIME))
     rows = np.arange(times) * (n - 1) // max(times - 1, 1)
     stride = -(-times // min(MAX_SOLVED, max(MIN_SOLVED, count // EVALUATIONS_PER_SOLVE))) if accelerations else 0
     switched = result.phases is not None and bool(s.switches)
-    out = s.kept.get("figures", (times, switched), 2, lambda: _pool(s, S, times, switched)).new()
+    out = s.cache.get("figures", (times, switched), 2, lambda: _pool(s, S, times, switched)).new()
     if work is None:
         work = pooled_work(s, S, S.const.dtype)
         work.array("options").solve_tolerance = SOLVE_TOLERANCE
@@ -107,7 +107,7 @@ def record_motion(
     for part, first, last in _systems(result, rows, system):
         tables = struct_tables(s, part)
         record_motion_kernel(engine.address, tables, *buffers, least, stride, deferred, first, last)
-    for k in s.kept.get("own energies", None, 1, lambda: _own_energies(s)):
+    for k in s.cache.get("own energies", None, 1, lambda: _forces_with_python_energy(s)):
         f = s.forces[k]
         out.array("elastic")[:, k] = 0.0 if f.energy is None else result[f.name].energy[rows]
     if released.any():
@@ -130,12 +130,12 @@ def _systems(result: Result, rows: np.ndarray, system: System | None) -> list[tu
     """Return the tables with the parameters of each part of the recorded times, and its first and last time."""
     if result.phases is None:
         return [(system or result.values.system, 0, len(rows))]
-    cuts = [(at.stop, phases.all[0].values.system) for at, phases in result.phases.pieces()]
+    cuts = [(at.stop, phases.all[0].values.system) for at, phases in result.phases.equal_parameter_phases()]
     ends = np.searchsorted(rows, [stop for stop, _ in cuts]).tolist()
     return [(S, first, last) for (_, S), first, last in zip(cuts, [0, *ends], ends, strict=False)]
 
 
-def _own_energies(s: Structure) -> list[int]:
+def _forces_with_python_energy(s: Structure) -> list[int]:
     """Return the forces whose energy differs from that of the compiled formula of their kind."""
     return [k for k, f in enumerate(s.forces) if ENERGIES.get(getattr(f, "kind", -1)) is not f.energy]
 

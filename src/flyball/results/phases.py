@@ -95,7 +95,7 @@ class Phases:
         every = [(x.ways, x.rows) for x in self.all]
         return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
 
-    def pieces(self) -> list[tuple[slice, Phases]]:
+    def equal_parameter_phases(self) -> list[tuple[slice, Phases]]:
         """Return phases of equal parameters, and their output times."""
         out, first = [], 0
         for _, group in groupby(self.all, key=lambda x: id(x.values)):
@@ -128,7 +128,7 @@ def phases_or_none(phases: Sequence[Phase]) -> Phases | None:
 
 def split_by_parameters(result: Any) -> tuple[Any, ...]:
     """Return a result in pieces of constant parameters, if parameters changed; else none."""
-    cuts = result.phases.pieces() if result.phases is not None else []
+    cuts = result.phases.equal_parameter_phases() if result.phases is not None else []
     if len(cuts) < 2:
         return ()
     names = "t", "q", "v", "states", "vdot", "multipliers"
@@ -140,7 +140,7 @@ def split_by_parameters(result: Any) -> tuple[Any, ...]:
         piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
         piece.begun, piece.within = result.begun, (result, at)
         if result.contacts is not None:
-            piece.contacts = result.contacts.taken(range(at.start, at.stop))
+            piece.contacts = result.contacts.at_times(range(at.start, at.stop))
         out.append(piece)
     return tuple(out)
 
@@ -335,7 +335,7 @@ class Moment:
         return found if found < 0 else min(found + after, len(every) - 1)
 
     @cached_property
-    def alone(self) -> Result:
+    def single_time_result(self) -> Result:
         """Return a result of this one time; unknown data are nan."""
         r = self._of
         s = self.values.structure
@@ -357,7 +357,7 @@ class Moment:
         ModelError
             If there is no such curve, or it jumps there.
         """
-        value = np.asarray(self.alone.channel(name if "." in name else f"{name}.value")[1])[0]
+        value = np.asarray(self.single_time_result.channel(name if "." in name else f"{name}.value")[1])[0]
         if not np.isfinite(value).all():
             raise ModelError(
                 f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "

@@ -217,7 +217,7 @@ class EventImpulses(Mapping):
         """Return the impulses without the states of a result."""
         return EventImpulses(self._own, self._rows, self._blows)
 
-    def plain(self) -> dict[str, Any]:
+    def as_plain_data(self) -> dict[str, Any]:
         """Return plain data: the arguments of the class."""
         return {"own": self._own, "rows": self._rows.tolist(), "blows": self._blows}
 
@@ -274,7 +274,11 @@ class EventImpulses(Mapping):
         if name not in self._names:
             raise KeyError(name)
         blows = applied_by_event(self._blows)
-        return applied_impulse_value(blows[name], self._structure) if name in blows else self._reactions.told(name)
+        return (
+            applied_impulse_value(blows[name], self._structure)
+            if name in blows
+            else self._reactions.event_impulse(name)
+        )
 
     @property
     def _structure(self) -> Structure:
@@ -331,7 +335,7 @@ class ImpulseReactions(JointReactions):
     """Reactions at an instant: impulses in place of forces."""
 
     def __init__(self, before: Moment, after: Moment, rows: np.ndarray, applied: Sequence[AppliedImpulse]) -> None:
-        came, went = before.alone, after.alone
+        came, went = before.single_time_result, after.single_time_result
         made = type(came)(
             came.model, went.values, came.t, came.q, came.v, came.states, came.vdot, rows[None, :], came.health,
         )  # fmt: skip
@@ -339,7 +343,7 @@ class ImpulseReactions(JointReactions):
         super().__init__(made)
         self._after, self._blows = went, applied
 
-    def told(self, name: str) -> Any:
+    def event_impulse(self, name: str) -> Any:
         """Return the impulse of a contact, joint, coupling or driver; see `EventImpulses`."""
         result, s = self._result, self._result.values.structure
         e = s.model[name]

@@ -115,14 +115,14 @@ class RecordedMotion:
             S = self.x.system
             offset, turn = load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
             b = int(S.frame_body[k])
-            self._frames[k] = self.carried(b, offset, turn)
+            self._frames[k] = self.attached(b, offset, turn)
         return self._frames[k]
 
     def forget(self) -> None:
         """Discard the cached frames; they are computed again on demand."""
         self._frames.clear()
 
-    def carried(self, b: int, offset: tuple, turn: tuple) -> KinematicRecord:
+    def attached(self, b: int, offset: tuple, turn: tuple) -> KinematicRecord:
         """Return the record of a point and axes fixed on body b (-1: ground)."""
         if b >= 0:
             return attached_record(self.body(b), offset, turn)
@@ -141,7 +141,7 @@ class RecordedMotion:
 
     def named(self, name: str) -> KinematicRecord:
         """Return the record of a named frame, or of a body's own frame."""
-        return self.carried(*self.placed(name))
+        return self.attached(*self.placed(name))
 
     def angle(self, b: int) -> np.ndarray:
         """Return the angle [rad] of body b (-1: ground) of a planar mechanism, with full turns; (n,).

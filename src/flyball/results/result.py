@@ -473,7 +473,7 @@ def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
         out.exchanged |= event_energies(out)
     if last.contacts is not None:
         taken = [
-            p.contacts.taken(np.flatnonzero(k)) for p, k in zip(parts, keep, strict=True) if p.contacts is not None
+            p.contacts.at_times(np.flatnonzero(k)) for p, k in zip(parts, keep, strict=True) if p.contacts is not None
         ]
         out.contacts = concatenate_contacts(taken, out.t)
     out.bulk = {name: _joined_set([p.bulk[name] for p in parts], keep) for name in last.bulk}
@@ -495,7 +495,7 @@ class SharedTables:
         """Return tables with the same numbers in the one structure, always the same object."""
         key = self._key(x)
         if key not in self._all:
-            self._all[key] = x if x.structure is self._structure else values(self._structure, x.told)
+            self._all[key] = x if x.structure is self._structure else values(self._structure, x.parameter_values)
         return self._all[key]
 
 

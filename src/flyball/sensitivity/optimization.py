@@ -107,10 +107,10 @@ def optimize(model: Model, o: OptimizeOptions) -> Optimum:
         try:
             return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)
         except KeyboardInterrupt as stopped:
-            left = search.left()
-            if left is None:
+            interruption = search.interruption()
+            if interruption is None:
                 raise
-            raise left from stopped
+            raise interruption from stopped
 
 
 class ParameterSearch:
@@ -123,7 +123,7 @@ class ParameterSearch:
                 raise ModelError(
                     f"{model.name!r} has no parameter {name!r}{suggest(name, list(env))}; {listing(list(env))}"
                 )
-        self.model, self.asked, self.names, self.tell = model, o, tuple(o.to), report_progress
+        self.model, self.options, self.names, self.tell = model, o, tuple(o.to), report_progress
         self.start = np.array([env[name] for name in self.names])
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.low, self.high = (self._bounds(o.to, k) for k in (0, 1))
@@ -155,13 +155,15 @@ class ParameterSearch:
             values = dict(zip(self.names, (x * self.scale).tolist(), strict=True))
             self.count += 1
             try:
-                found = sensitivity(self.model, self.asked.sensitivity(values))
+                found = sensitivity(self.model, self.options.sensitivity(values))
             except AnalysisError as error:
                 named = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
                 error.args = (f"with {named}: {error}", *error.args[1:])
                 self._refused.append(str(error))
                 raise
-            self.tell(self.count / self.asked.evaluations, f"{self.count} of at most {self.asked.evaluations} analyses")
+            self.tell(
+                self.count / self.options.evaluations, f"{self.count} of at most {self.options.evaluations} analyses"
+            )
             self._known = x.copy(), found
         return self._known[1]
 
@@ -172,7 +174,7 @@ class ParameterSearch:
         if self._best is None or cost < self._best[0]:
             self._best = cost, x.copy(), self.at(x)
 
-    def left(self) -> Interrupted | None:
+    def interruption(self) -> Interrupted | None:
         """The error for the user's interrupt, with the best parameters so far; None if there are none."""
         if self._best is None:
             return None
@@ -187,20 +189,20 @@ class ParameterSearch:
 
         x0 = self.start / self.scale
         first = self.at(x0)
-        goal = _target_array(target, first.values, self.asked.of or first.of, self.asked.analysis)
+        goal = _target_array(target, first.values, self.options.of or first.of, self.options.analysis)
 
         def split(r: np.ndarray) -> np.ndarray:
             return r if np.isrealobj(r) else np.concatenate([r.real, r.imag])
 
-        def left(found: Any) -> np.ndarray:
+        def residuals(found: Any) -> np.ndarray:
             return split((np.asarray(weights) * (found.values - goal)).ravel())
 
-        begin = left(first)
+        begin = residuals(first)
         size = float(np.abs(begin).max(initial=0.0)) or 1.0
 
         def residual(x: np.ndarray) -> np.ndarray:
             try:
-                r = left(self.at(x))
+                r = residuals(self.at(x))
             except AnalysisError:
                 return np.full(len(begin), FAILURE_COST * size)
             self._weighed(x, 0.5 * float(r @ r))
@@ -212,8 +214,8 @@ class ParameterSearch:
             return np.array([split(J[..., k].ravel()) for k in range(len(x))]).T * self.scale
 
         r = least_squares(
-            residual, x0, jacobian, bounds=(self.low, self.high), xtol=self.asked.tolerance,
-            ftol=self.asked.tolerance, gtol=1e-15, max_nfev=self.asked.evaluations,
+            residual, x0, jacobian, bounds=(self.low, self.high), xtol=self.options.tolerance,
+            ftol=self.options.tolerance, gtol=1e-15, max_nfev=self.options.evaluations,
         )  # fmt: skip
         flat = r.nfev == 1 and r.cost > 0.0 and not np.any(r.grad)
         out = self._optimum(
@@ -251,8 +253,8 @@ class ParameterSearch:
             return value, np.einsum("ij,ijk->k", slope.conj(), found.derivatives).real * self.scale
 
         bounds = list(zip(self.low, self.high, strict=True))
-        tolerance = self.asked.tolerance
-        options = {"maxfun": self.asked.evaluations, "ftol": tolerance, "gtol": tolerance}
+        tolerance = self.options.tolerance
+        options = {"maxfun": self.options.evaluations, "ftol": tolerance, "gtol": tolerance}
         r = minimize(cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
         flat = r.nfev == 1 and not np.any(r.jac)
         out = self._optimum(
@@ -278,7 +280,7 @@ class ParameterSearch:
             n for n, b in zip(self.names, (x - self.low < near) | (self.high - x < near), strict=True) if b
         )
         return Optimum(
-            best, start, cost, first, success, message, self.count, self.asked.of or found.of, found.t,
+            best, start, cost, first, success, message, self.count, self.options.of or found.of, found.t,
             found.values, at_bound, found.units,
         )  # fmt: skip
 

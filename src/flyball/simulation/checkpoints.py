@@ -115,19 +115,19 @@ class _SegmentedMotion:
                     error.result = kept.whole(error.result)
                 raise
             except Interrupted as error:
-                raise self._left(kept.whole(error.result)) from None
+                raise self._interrupted(kept.whole(error.result)) from None
             if not part.paused:
                 break
             kept.add(found)
             if part.asked:
                 result = kept.whole()
                 result.health.message = INTERRUPTED_MESSAGE.format(result.final[0])
-                raise self._left(result)
+                raise self._interrupted(result)
         result = kept.whole(found)
         kept.finish(result)
         return result
 
-    def _left(self, result: Result) -> Interrupted:
+    def _interrupted(self, result: Result) -> Interrupted:
         """Return the exception for the user's interrupt; the motion can be resumed where the last segment ended."""
         kept = self.kept
         kept.write()
@@ -145,14 +145,14 @@ class _SegmentedMotion:
         t = first if before is None else before.final[0]
         part = Segment(first, resumes=before is not None)
 
-        def tell(fraction: float) -> None:
+        def report_part(fraction: float) -> None:
             try:
                 self.tell((t + fraction * (last - t) - first) / (last - first))
             except KeyboardInterrupt:
                 if not part.interrupted():
                     raise
 
-        changed: Mapping[str, Any] = {"progress": tell}
+        changed: Mapping[str, Any] = {"progress": report_part}
         if before is not None:
             changed = {**changed, "start": before, "t_start": None}
             times = times[times >= t] if before.carried.get("open") else times[times > t]
@@ -175,11 +175,11 @@ def deferred_interrupt(part: Segment) -> Iterator[None]:
         yield
         return
 
-    def asked(number: int, frame: Any) -> None:
+    def on_interrupt(number: int, frame: Any) -> None:
         if not part.interrupted():
             signal.default_int_handler(number, frame)
 
-    signal.signal(signal.SIGINT, asked)
+    signal.signal(signal.SIGINT, on_interrupt)
     try:
         yield
     finally:

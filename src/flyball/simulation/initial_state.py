@@ -94,7 +94,7 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
 
 
 def _evaluation_cost(s: Structure) -> float:
-    return s.kept.get("cost", None, 1, partial(right_hand_side_cost, s))
+    return s.cache.get("cost", None, 1, partial(right_hand_side_cost, s))
 
 
 def _indeterminate_loads(a: Assembly) -> str:
@@ -148,7 +148,7 @@ def _sound_forest(
         if not tree:
             what = " that has inertia along its coordinates" if avoided else ""
             return None, f"no joint{what} can be a tree joint"
-        if model.kept.get("least", tree, MOST_AVOIDED, partial(least_cost, model, tree)) > most:
+        if model.cache.get("least", tree, MOST_AVOIDED, partial(least_cost, model, tree)) > most:
             return None, f"{_size_in_words(a.compiled)} (in joint coordinates the mass matrix alone needs more time)"
         c = compile_mechanism(model, parameters=parameters, tree=tree)
         bad = _massless_tree_joint(c, a)
@@ -232,7 +232,7 @@ class InitialState:
         return InitialState(base, a, self.y.copy(), self.coordinates, dict(self.wound), part=part)
 
     @property
-    def carried(self) -> Mapping[str, Any]:
+    def earlier_data(self) -> Mapping[str, Any]:
         """Data from the segment before this one; empty if there is none."""
         return self.before.carried if self.part.later and self.before is not None else {}
 
@@ -281,14 +281,14 @@ def find_initial_state(
     if before is not None or parameters or not model.frozen:
         return _computed_state(model, t, parameters, before, coordinates, switches, part)
     key = float(t).hex(), coordinates, switches
-    known: InitialState | None = model.kept.known("begun", key)
+    known: InitialState | None = model.cache.known("begun", key)
     if known is not None and is_outdated(known.base.compiled.structure):
-        model.kept.drop("begun", key)
+        model.cache.drop("begun", key)
         known = None
     if known is None:
         found = _computed_state(model, t, None, None, coordinates, switches, part)
         if _reproducible(found.base.compiled.structure):
-            model.kept.get("begun", key, MOST_STARTS, lambda: found.again(whole_motion()))
+            model.cache.get("begun", key, MOST_STARTS, lambda: found.again(whole_motion()))
         return found
     return known.again(part)
 
@@ -360,7 +360,7 @@ def initial_state_at(
     refuse_unknown_coordinates(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
-    found = x.unforced.kept.get(
+    found = x.unforced.cache.get(
         "begun", key, MOST_STARTS, lambda: _initial_state_of(base, coordinates, parameters, switches)
     )
     if found.assembly.compiled.values is found.base.compiled.values:
@@ -411,7 +411,11 @@ def add_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembl
 
 def _whole_turns(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
     s = a.compiled.structure
-    if not s.tree or not s.model.planar or (base.compiled.drawn(base.q) and a.compiled.drawn(y[: s.nq])):
+    if (
+        not s.tree
+        or not s.model.planar
+        or (base.compiled.is_reference_configuration(base.q) and a.compiled.is_reference_configuration(y[: s.nq]))
+    ):
         return {}
     q, c = y[: s.nq], a.compiled
     c.at(a.t, q, np.zeros(s.nv))

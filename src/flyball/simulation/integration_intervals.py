@@ -26,7 +26,7 @@ def laws_checked_in_steps(c: CompiledMechanism, breaks: Breakpoints) -> frozense
 
     These are laws that depend on the state, and laws whose breakpoints could not be found.
     """
-    by_state = c.structure.kept.get("laws that follow the state", None, 1, lambda: _laws_of_state(c))
+    by_state = c.structure.cache.get("laws that follow the state", None, 1, lambda: _laws_of_state(c))
     if not breaks.given_up:
         return by_state
     return by_state | {int(at) for at in law_starts(c.system) if at in breaks.given_up}
@@ -150,7 +150,7 @@ def known_breaks(c: CompiledMechanism, t0: float, t1: float) -> Breakpoints:
 
 def laws_of_time(c: CompiledMechanism) -> Timed:
     """Return the laws that may have breakpoints or pulses by time alone, for any values of their constants."""
-    return c.structure.kept.get("laws of time", None, 1, lambda: _find_laws_of_time(c))
+    return c.structure.cache.get("laws of time", None, 1, lambda: _find_laws_of_time(c))
 
 
 def _find_laws_of_time(c: CompiledMechanism) -> Timed:

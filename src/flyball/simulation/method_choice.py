@@ -40,7 +40,7 @@ IMPULSE_REMEDY = "leave method out, or give method='impulse'"
 def contact_points(model: Model, parameters: Mapping[str, float] | None) -> ContactPlaces:
     """Return the contact points of a model at the given parameter values."""
     given = element_numbers(model, parameters)
-    return model.kept.get("places", given.key, MOST_COPIES, lambda: contact_places(model, given))
+    return model.cache.get("places", given.key, MOST_COPIES, lambda: contact_places(model, given))
 
 
 def unsupported_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
@@ -88,7 +88,7 @@ def with_contact_points(model: Model, parameters: Mapping[str, float] | None) ->
             f"{_first_of_several(p.why_not)}; {IMPULSE_REMEDY}"
         )
     key = element_numbers(model, parameters).key
-    return model.kept.get("with places", key, MOST_COPIES, lambda: _with_touches(model, p.touches))
+    return model.cache.get("with places", key, MOST_COPIES, lambda: _with_touches(model, p.touches))
 
 
 def _with_touches(model: Model, touches: tuple[Touch, ...]) -> Model:

@@ -147,7 +147,7 @@ def make_result(
         result.carried |= _data_for_next_segment(here, deferred is not None)
     result.events = here.records
     if here.recorder is not None:
-        here.recorder.told(result)
+        here.recorder.add_phases(result)
         result.contacts = event_driven_contacts(result)
     result.record = record_motion(result, a.compiled.scratch, system=a.compiled.system)
     if unsolved is not None and not result.record.solved:
@@ -180,7 +180,7 @@ def _cause_of_failed_step(a: Assembly, clock: ex.StepState) -> str:
 def _data_for_next_segment(here: EventContext, followed: bool) -> dict[str, Any]:
     """Return the data with which the next segment starts."""
     pace, found = here.start.pace, {"open": here.start.part.open, "followed": followed}
-    return found | {"by": pace.carried if pace else "", "width": float(here.clock.real.h)}
+    return found | {"by": pace.continuing_method if pace else "", "width": float(here.clock.real.h)}
 
 
 def _health(start: InitialState, clock: ex.StepState, o: Integration) -> Health:
@@ -206,5 +206,5 @@ def _health(start: InitialState, clock: ex.StepState, o: Integration) -> Health:
         ),
         departures=start.base.departures,
         coordinates=start.coordinates,
-        engine=start.engine.told if start.engine else "",
+        engine=start.engine.description if start.engine else "",
     )

@@ -47,7 +47,7 @@ def leaves_no_freedom(start: InitialState) -> bool:
         return False
     a = start.base
     x, key = a.compiled.values, (float(a.t).hex(), a.y.tobytes())
-    return x.kept.get("held", key, MOST_STARTS, lambda: _rank_of_rows(a) == s.nv)
+    return x.cache.get("held", key, MOST_STARTS, lambda: _rank_of_rows(a) == s.nv)
 
 
 def _rank_of_rows(a: Assembly) -> int:
@@ -250,7 +250,7 @@ class SwitchHistory(NamedTuple):
 
 def _switch_history(result: Result) -> SwitchHistory:
     old = result.values.structure
-    c = compile_mechanism(result.model, parameters=result.values.told, tree=old.tree, switches=True)
+    c = compile_mechanism(result.model, parameters=result.values.parameter_values, tree=old.tree, switches=True)
     every = c.structure.switches
     which = [k for k, spec in enumerate(every) if spec.measured >= 0]
     specs = [every[k] for k in which]

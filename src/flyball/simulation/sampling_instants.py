@@ -33,7 +33,7 @@ class SampledController(NamedTuple):
         first = max(0, math.floor((a - self.offset) / self.period + INSTANT_TOLERANCE) + 1)
         return max(0, math.ceil((b - self.offset) / self.period - INSTANT_TOLERANCE) - first)
 
-    def told(self, a: float, b: float) -> str:
+    def description(self, a: float, b: float) -> str:
         """Describe how many sampling instants lie between two times."""
         return (
             f"{self.title} has a period of {self.period:g} s: from t = {a:.6g} s to the end at {b:.6g} s it is sampled "
@@ -61,7 +61,7 @@ def refuse_too_often(c: CompiledMechanism, span: tuple[float, float], most: int)
     """
     for x in [] if c.structure.model.events else sampled_by_period(c)[:1]:
         if x.between(*span) > most:
-            raise ModelError(f"{x.told(*span)}; max_steps = {most}. {PERIOD_REMEDY}")
+            raise ModelError(f"{x.description(*span)}; max_steps = {most}. {PERIOD_REMEDY}")
 
 
 def sampling_limits_steps(c: CompiledMechanism, clock: ex.StepState, t_start: float) -> str:
@@ -70,7 +70,7 @@ def sampling_limits_steps(c: CompiledMechanism, clock: ex.StepState, t_start: fl
     for x in sampled_by_period(c)[:1]:
         if x.between(t_start, t) >= SAMPLING_SHARE * clock.count.accepted:
             return (
-                f"max_steps = {clock.count.limit} steps were taken up to t = {t:.6g} s. {x.told(t, end)}. "
+                f"max_steps = {clock.count.limit} steps were taken up to t = {t:.6g} s. {x.description(t, end)}. "
                 f"{PERIOD_REMEDY}"
             )
     return ""

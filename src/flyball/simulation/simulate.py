@@ -141,12 +141,12 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
     made = False if o.method in IMPLICIT_METHODS else o.specialize
     begun.engine = CodeSelection(begun.assembly.compiled, made, UNSUPPORTED_BY_GENERATED.get(o.stabilization, ""))
     if o.method in IMPLICIT_METHODS:
-        begun.engine.told = f"{GENERAL_ENGINE}: {o.method} uses it"
+        begun.engine.description = f"{GENERAL_ENGINE}: {o.method} uses it"
     mixed = auto and o.stabilization == "projection" and o.step is None
     begun.pace = StiffnessMonitor(
         float(o.t_end), AUTO_METHOD if mixed else str(o.method), partial(reason_against_implicit, begun)
     )
-    begun.pace.resume_with(begun.carried.get("by", ""))
+    begun.pace.resume_with(begun.earlier_data.get("by", ""))
     follow = o.stabilization == "projection" and not has_guards(begun) and _fully_driven(begun)
     with progress_bar(o.progress, "simulating") as tell:
         result = integrate_motion(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -201,7 +201,7 @@ def integrate_motion(
             more, interrupted = integrate_events(here, o, row_width(start.assembly), report, engine, known)
             rows = np.concatenate([rows, more])
         elif start.pace is not None:
-            here.method = "; ".join(start.pace.told)
+            here.method = "; ".join(start.pace.changes)
     if task == INTEGRATE:
         here.detection_remark = "; ".join(x for x in (here.detection_remark, remark_on_checked_laws(c, sampled)) if x)
     owed = None
@@ -219,7 +219,7 @@ def _no_stops(start: InitialState) -> bool:
 
 def _fully_driven(start: InitialState) -> bool:
     """Return whether drivers leave no freedom; a later segment takes this from the segment before it."""
-    return bool(start.carried["followed"]) if "followed" in start.carried else leaves_no_freedom(start)
+    return bool(start.earlier_data["followed"]) if "followed" in start.earlier_data else leaves_no_freedom(start)
 
 
 def has_guards(start: InitialState) -> bool:
@@ -259,7 +259,7 @@ def clock_for(
     first = t if start.part.first is None else start.part.first
     real.span = (t_end - first) or 1.0
     real.step = o.step or 0.0
-    real.h = o.step or start.carried.get("width", 0.0)
+    real.h = o.step or start.earlier_data.get("width", 0.0)
     real.h_max = min(o.step or o.max_step, t_end - t)
     real.largest = max(abs(t), abs(t_end))
     count.quota = 50
@@ -286,7 +286,7 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> Non
     real.energy_size = energy_scale(base, float(real.span))
     rate = c.array("options").rate = characteristic_rate_within(c.values.system, float(real.span))
     nq, nv = c.structure.nq, c.structure.nv
-    clock.y[ex.UNIT] = c.values.kept.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
+    clock.y[ex.UNIT] = c.values.cache.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
     clock.y[ex.UNIT, nq : nq + nv] *= rate
     loose = real.atol + real.rtol
     near = loose * min(1.0, loose / TIGHT_TOLERANCE)
@@ -315,7 +315,7 @@ def energy_scale(a: Assembly, span: float) -> float:
     energy.
     """
     x = a.compiled.values
-    weight = x.unforced.kept.get("weight", None, 1, lambda: _weight(x.system))
+    weight = x.unforced.cache.get("weight", None, 1, lambda: _weight(x.system))
     return rest_energy(weight, x.length, span) + a.compiled.kinetic_energy(a.v)
 
 

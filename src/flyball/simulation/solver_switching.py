@@ -83,7 +83,7 @@ def mechanism_kind(s: Structure) -> tuple[str, float]:
     """Return a key shared by mechanisms that differ in numbers only, and the cost of an evaluation by the general
     engine [ns].
     """
-    return s.kept.get(
+    return s.cache.get(
         "kind", None, 1, lambda: (_structure_hash(s), EVALUATION_COST + COST_SHARE * right_hand_side_cost(s))
     )
 
@@ -151,7 +151,7 @@ class CodeSelection:
     """
 
     def __init__(self, c: CompiledMechanism, wish: bool | str, without: str = "") -> None:
-        self.c, self.told, self.due = c, f"{GENERAL_ENGINE}: as requested", math.inf
+        self.c, self.description, self.due = c, f"{GENERAL_ENGINE}: as requested", math.inf
         self._first = math.nan  # start time of the motion
         self._counted = 0
         if wish is False:
@@ -159,9 +159,9 @@ class CodeSelection:
         if wish is True:
             self._require_generated_code(without or (NO_MODES if c.structure.guards else ""))
         elif why := without or (NO_MODES if c.structure.guards else ""):
-            self.told = f"{GENERAL_ENGINE}: {why}"
+            self.description = f"{GENERAL_ENGINE}: {why}"
         else:
-            self.told = TOO_SHORT
+            self.description = TOO_SHORT
             if wish == AUTO_CODE:
                 self.due = FIRST_DECISION
                 self._kind, self._each = mechanism_kind(c.structure)
@@ -190,9 +190,9 @@ class CodeSelection:
 
         The general engine either gets through, or leaves in the workspace the data for diagnosis.
         """
-        if self.c.made is None or clock.count.status not in FAILED_STATUS:
+        if self.c.generated is None or clock.count.status not in FAILED_STATUS:
             return False
-        self.told += f"; general engine from t = {clock.real.t:.6g} s, where it failed"
+        self.description += f"; general engine from t = {clock.real.t:.6g} s, where it failed"
         self.c.run_on_tables()
         clock.count.status, clock.real.max_growth = ex.RUNNING, 1.0
         clock.real.h = max(clock.real.h, clock.real.wide)
@@ -210,7 +210,7 @@ class CodeSelection:
         """End the use of generated code; the motion continues by a method that needs the general engine."""
         self.end()
         self.due = math.inf
-        if self.c.made is not None:
+        if self.c.generated is not None:
             self.c.run_on_tables()
 
     def end(self) -> None:
@@ -243,7 +243,7 @@ class CodeSelection:
             if there or self._pays(remaining_cost + SPENT.of(self._kind) / HISTORY_WEIGHT, codegen.price(plan, there)):
                 self._take(*codegen.code(plan, x))
         except codegen.Refused as error:
-            self.told, self.due = f"{GENERAL_ENGINE}: {error}", math.inf
+            self.description, self.due = f"{GENERAL_ENGINE}: {error}", math.inf
 
     def _pays(self, computing: float, price: float) -> bool:
         """Return whether generated code is worth its price (both [ns])."""
@@ -251,7 +251,7 @@ class CodeSelection:
 
     def _take(self, code: codegen.GeneratedCode, how: str) -> None:
         self.c.run_on(code)
-        self.told, self.due = f"{GENERATED_CODE}: {how}", math.inf
+        self.description, self.due = f"{GENERATED_CODE}: {how}", math.inf
 
 
 AUTO_SWITCHING, EXPLICIT_METHOD, STIFF_METHOD = "auto", "dop853", "radau"
@@ -319,7 +319,7 @@ class StiffnessMonitor:
 
     def __init__(self, t_end: float, method: str, why_not: Callable[[], str]) -> None:
         self.t_end, self.mixed, self.why_not = t_end, method == AUTO_SWITCHING, why_not
-        self.told: list[str] = []
+        self.changes: list[str] = []
         self.asked = self.back = self.now = ""
         self._goes_on = False
         self.every, self.often, self.row, self.rate = CHECK_INTERVAL, CHECK_INTERVAL, 0, 0.0
@@ -349,7 +349,7 @@ class StiffnessMonitor:
         if self.row < CHECKS_IN_A_ROW:
             return ""
         if now == EXPLICIT_METHOD and (why := self.why_not()):
-            self.told = [f"{EXPLICIT_METHOD}, though it is stiff from t = {clock.real.t:.6g} s on: {why}"]
+            self.changes = [f"{EXPLICIT_METHOD}, though it is stiff from t = {clock.real.t:.6g} s on: {why}"]
             self.every = NEVER_AGAIN
             return ""
         return STIFF_METHOD if now == EXPLICIT_METHOD else EXPLICIT_METHOD
@@ -362,7 +362,7 @@ class StiffnessMonitor:
             self.asked = EXPLICIT_METHOD
 
     @property
-    def carried(self) -> str:
+    def continuing_method(self) -> str:
         """Method with which a continued motion starts; empty for the default."""
         return self.back or self.now if self.mixed else ""
 
@@ -373,21 +373,25 @@ class StiffnessMonitor:
 
     def words(self) -> str:
         """Describe which methods were used and from which time on."""
-        if len(self.told) <= MOST_REPORTED + 1:
-            return "; ".join(self.told)
+        if len(self.changes) <= MOST_REPORTED + 1:
+            return "; ".join(self.changes)
         return "; ".join(
-            [*self.told[:MOST_REPORTED], f"... {len(self.told) - MOST_REPORTED - 1} more times ...", self.told[-1]]
+            [
+                *self.changes[:MOST_REPORTED],
+                f"... {len(self.changes) - MOST_REPORTED - 1} more times ...",
+                self.changes[-1],
+            ]
         )
 
     def turned(self, clock: ex.StepState, to: str, why: str) -> None:
         """Record the change to another method."""
         self.now = to
         if not self._goes_on:
-            if not self.told:
-                self.told.append(EXPLICIT_METHOD if to == STIFF_METHOD else STIFF_METHOD)
-            self.told.append(f"{to} from t = {clock.real.t:.6g} s on, {why}")
+            if not self.changes:
+                self.changes.append(EXPLICIT_METHOD if to == STIFF_METHOD else STIFF_METHOD)
+            self.changes.append(f"{to} from t = {clock.real.t:.6g} s on, {why}")
         self._goes_on = False
-        again = sum(x.endswith(BECAUSE_NOT_STIFF) for x in self.told)
+        again = sum(x.endswith(BECAUSE_NOT_STIFF) for x in self.changes)
         self.every = self.often = (
             IMPLICIT_CHECK_INTERVAL if to == STIFF_METHOD else CHECK_INTERVAL * PATIENCE_FACTOR ** min(again, 6)
         )

@@ -267,7 +267,7 @@ class BranchCrossing:
     """All branches through a point."""
 
     kernel: np.ndarray  # (columns, k) of J
-    left: np.ndarray  # (rows, l)
+    left_null_vectors: np.ndarray  # (rows, l)
     curves: list[BranchCurve]
     decided: bool  # whether the second order determined all branches
     endless: tuple[str, ...]  # driver motions (see `DRIVES`) that infinitely many directions allow

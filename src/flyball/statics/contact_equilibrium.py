@@ -21,7 +21,7 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.contact import not_for_impulse_stepping
 from ..model.model import Model
 from ..results.equilibrium import (
-    ABOUT_TO_PART,
+    ABOUT_TO_OPEN,
     AT_FRICTION_LIMIT,
     FRICTIONLESS,
     MARGINAL,
@@ -353,7 +353,7 @@ def _contact_equilibrium_result(
     result.contacts = contact_table(place, found.force)
     notes = _equilibrium_notes(touches, found, missing)
     kind = smooth_result.stability if smooth_result else NOT_JUDGED
-    if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_PART) for k in touches) and kind != "unstable":
+    if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_OPEN) for k in touches) and kind != "unstable":
         kind = MARGINAL
     own = smooth_result or Equilibrium(
         t=x.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
@@ -384,7 +384,7 @@ def touch_states(
         slides = float(np.hypot(f[1], f[2]))
         most_of_it = c.friction * float(f[0])
         used = slides / most_of_it if most_of_it > 0.0 else 0.0
-        state = ABOUT_TO_PART if f[0] <= NOTHING * most else FRICTIONLESS if c.friction == 0.0 else STICKS
+        state = ABOUT_TO_OPEN if f[0] <= NOTHING * most else FRICTIONLESS if c.friction == 0.0 else STICKS
         state = AT_FRICTION_LIMIT if state == STICKS and used >= 1.0 - NEAR else state
         out.append(Touch(c.name, state, float(f[0]), slides, used, c.gap))
     for name, bound in bears.items():
@@ -392,7 +392,7 @@ def touch_states(
         out.append(Touch(name, AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS, bound, abs(lam[name]), used))
     for name, effort in stops.items():
         out.append(
-            Touch(name, ABOUT_TO_PART if effort <= NOTHING * max(map(abs, stops.values())) else FRICTIONLESS, effort)
+            Touch(name, ABOUT_TO_OPEN if effort <= NOTHING * max(map(abs, stops.values())) else FRICTIONLESS, effort)
         )
     return tuple(out)
 
@@ -401,7 +401,7 @@ def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing
     """Notes for the result."""
     out = []
     for state, rule in (
-        (ABOUT_TO_PART, "it carries no force; the results are valid while it stays closed"),
+        (ABOUT_TO_OPEN, "it carries no force; the results are valid while it stays closed"),
         (AT_FRICTION_LIMIT, "any more load along it would make it slide"),
     ):
         names = [k.name for k in touches if k.state == state]

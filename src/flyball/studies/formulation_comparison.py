@@ -167,7 +167,7 @@ class _ComparisonTask:
     """The motion that all formulations compute."""
 
     model: Model
-    asked: CompareOptions
+    options: CompareOptions
     span: tuple[float, float]
     times: np.ndarray
     base: InitialState
@@ -197,10 +197,10 @@ def _run_all(
     """Run all formulations, first for the results, then for their cost."""
     starts: dict[str, InitialState] = {}
     rows = []
-    names = job.asked.formulations or ()
+    names = job.options.formulations or ()
     for k, name in enumerate(names):
         rows.append(_formulation(job, name, starts, truth))
-        report_progress((k + 1) / len(names) * (0.5 if job.asked.repeats else 1.0), name)
+        report_progress((k + 1) / len(names) * (0.5 if job.options.repeats else 1.0), name)
     _measure_costs(job, rows, starts, report_progress)
     report_progress(1.0)
     energy = float(truth.energy.kinetic.max(initial=0.0)) if truth is not None else np.nan
@@ -253,14 +253,14 @@ def _initial_state(job: _ComparisonTask, formulation: FormulationChoice) -> Init
     a, rows = job.base.assembly, len(job.base.assembly.compiled.structure.rows)
     if formulation.method:
         try:
-            begun = in_suitable_coordinates(job.base, formulation.method, "absolute", job.asked.parameters)
+            begun = in_suitable_coordinates(job.base, formulation.method, "absolute", job.options.parameters)
             if formulation.method == VARIATIONAL:
                 refuse_for_variational(begun)
             return begun
         except ModelError as error:
             raise AnalysisError(str(error)) from None
     if formulation.coordinates == "joint":
-        made = find_initial_state(job.model, job.span[0], job.asked.parameters, job.asked.start, "joint")
+        made = find_initial_state(job.model, job.span[0], job.options.parameters, job.options.start, "joint")
         if not made.assembly.compiled.structure.tree:
             raise AnalysisError(f"there are no joint coordinates: {made.coordinates.removeprefix('absolute: ')}")
         return made
@@ -273,7 +273,7 @@ def _initial_state(job: _ComparisonTask, formulation: FormulationChoice) -> Init
             "some body has no inertia about some axis, so that M has no inverse; the coupled matrix is factored in an "
             "order that needs one"
         )
-    c = compile_mechanism(job.model, parameters=job.asked.parameters, coupled=True)
+    c = compile_mechanism(job.model, parameters=job.options.parameters, coupled=True)
     c.z = a.compiled.z.copy()
     return replace(job.base, assembly=replace(a, compiled=c))
 
@@ -334,7 +334,7 @@ def _formulation(job: _ComparisonTask, name: str, starts: dict[str, InitialState
 
 
 def _integration(job: _ComparisonTask, name: str) -> Integration:
-    return job.asked.integration_options(FORMULATIONS[name], job.max_steps).with_tolerance()
+    return job.options.integration_options(FORMULATIONS[name], job.max_steps).with_tolerance()
 
 
 def _state(c: CompiledMechanism, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -388,7 +388,7 @@ def _measure_costs(
     """Repeat the formulations that reached the end without intermediate outputs, to measure their cost."""
     end = job.times[-1:] * 0.0 + job.span[1]
     spent: dict[str, list[float]] = {f.name: [] for f in rows if f.success}
-    repeats = job.asked.repeats
+    repeats = job.options.repeats
     for k in range(repeats):
         report_progress(0.5 + 0.5 * k / repeats, "costs")
         for f in rows:

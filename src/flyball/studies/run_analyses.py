@@ -192,7 +192,7 @@ class MotionAnalysis(TimedAnalysis):
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
         """Options of the study, with its output times."""
-        return SimulateOptions.asked({**known, "outputs": times, "progress": False})
+        return SimulateOptions.from_arguments({**known, "outputs": times, "progress": False})
 
     def run(self, model: Model, o: SimulateOptions) -> Any:
         """The motion to its end."""
@@ -218,7 +218,7 @@ class KinematicsAnalysis(TimedAnalysis):
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
         """Options of the study, with its output times."""
-        return KinematicsOptions.asked({**known, "times": times, "t_end": None, "progress": False})
+        return KinematicsOptions.from_arguments({**known, "times": times, "t_end": None, "progress": False})
 
     def run(self, model: Model, o: KinematicsOptions) -> Any:
         """The motion prescribed by the drivers."""
@@ -241,7 +241,7 @@ class FunctionAnalysis(RunAnalysis):
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
         """The values of parameters."""
-        return FunctionOptions.asked(known)
+        return FunctionOptions.from_arguments(known)
 
     def run(self, model: Model, o: FunctionOptions) -> Any:
         """The return value of the function."""
@@ -294,7 +294,7 @@ class InstantAnalysis(RunAnalysis):
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
         """Time and parameters."""
-        return AssembleOptions.asked({**known, "t": known["t"] or 0.0})
+        return AssembleOptions.from_arguments({**known, "t": known["t"] or 0.0})
 
     def run(self, model: Model, o: AssembleOptions) -> Any:
         """The state as a result with one time."""

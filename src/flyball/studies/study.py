@@ -69,7 +69,7 @@ class RunSpecification:
     single: RunAnalysis
     options: Any
     names: tuple[str, ...]
-    asked: tuple[StudyQuantity, ...]
+    quantities: tuple[StudyQuantity, ...]
     times: np.ndarray
 
     def at(self, point: np.ndarray) -> Any:
@@ -79,7 +79,7 @@ class RunSpecification:
 
     def empty(self, n: int) -> RunResults:
         """Empty results of n runs."""
-        shapes = [(n, len(self.times)) if r.how == CURVE else (n,) for r in self.asked]
+        shapes = [(n, len(self.times)) if r.how == CURVE else (n,) for r in self.quantities]
         return RunResults([np.full(s, np.nan) for s in shapes], np.zeros(n, np.int8))
 
 
@@ -146,7 +146,7 @@ def _compute_run(question: RunSpecification, point: np.ndarray, out: RunResults,
     single = question.single
     try:
         found = single.run(question.model, question.at(point))
-        for values, x in zip(out.values, single.read(found, question.asked, question.times), strict=True):
+        for values, x in zip(out.values, single.read(found, question.quantities, question.times), strict=True):
             values[k] = x
         if doubts := single.doubtful(found):
             out.doubtful[k] = "; ".join(doubts)
@@ -443,7 +443,7 @@ def study(model: Model, o: StudyOptions) -> Study:
 
 def _study_fingerprint(question: RunSpecification, points: np.ndarray) -> str:
     """Fingerprint that identifies the study."""
-    o, asked = question.options, [(r.title, r.function) for r in question.asked]
+    o, asked = question.options, [(r.title, r.function) for r in question.quantities]
     known = {f.name: getattr(o, f.name) for f in fields(o)} | {"analysis": question.single.title}
     own = getattr(question.single, "function", None)
     return study_fingerprint(
@@ -463,10 +463,10 @@ def _blank_study(
         parameters=question.names,
         points=x,
         axes=axes,
-        of=tuple(r.title for r in question.asked),
-        units=tuple(r.unit for r in question.asked),
+        of=tuple(r.title for r in question.quantities),
+        units=tuple(r.unit for r in question.quantities),
         t=question.times,
-        values=dict(zip((r.title for r in question.asked), blank.values, strict=True)),
+        values=dict(zip((r.title for r in question.quantities), blank.values, strict=True)),
         status=blank.status,
         options=_option_values(question.options),
         base={name: env[name] for name in question.names},

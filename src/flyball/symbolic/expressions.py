@@ -257,7 +257,7 @@ class Expressions:
             return "none" if len(self.shape) == 1 else f"no entries: {self.shape[0]} x {self.shape[1]}"
         shown = self._read
         if symbol_count(shown.list()) > LINE_WIDTH:
-            return self._parted
+            return self._entry_lines
         if len(self.shape) < 2:
             names = (self.rows or tuple(map(str, range(self.shape[0])))) if self.shape else ("",)
             wide = max(map(len, names)) + 2 if self.shape else 0
@@ -267,14 +267,14 @@ class Expressions:
             made = "\n".join(f"{n:{wide}}{x}" for n, x in zip(names, texts, strict=True))
         else:
             made = text.matrix(shown.nodes)
-        return made if max(map(len, made.split("\n"))) <= MAX_WIDTH else self._parted
+        return made if max(map(len, made.split("\n"))) <= MAX_WIDTH else self._entry_lines
 
     @property
     def _refused(self) -> str:
         return f"{self!r}: {TOO_LONG.format(self.operations)}"
 
     @cached_property
-    def _parted(self) -> str:
+    def _entry_lines(self) -> str:
         """Entry by entry, with names for common subexpressions."""
         labels = [", ".join(x) for x in itertools.product(*self._names())]
         rows = [(a, x) for a, x in zip(labels, self.readable, strict=True) if x != 0.0]

@@ -226,7 +226,7 @@ class ClosedFormAngles:
         here, there = (self._heading(k) + self._since[int(S.frame_body[k])] for k in (F, M))
         if isinstance(owner, Body | Frame):
             return there
-        drawn_here, drawn_there = (self._heading(k) + self._drawn(int(S.frame_body[k])) for k in (F, M))
+        drawn_here, drawn_there = (self._heading(k) + self._reference_angle(int(S.frame_body[k])) for k in (F, M))
         whole = math.floor((_real(drawn_there) - _real(drawn_here)) / FULL_TURN + 0.5)
         return there - here - FULL_TURN * whole
 
@@ -246,7 +246,7 @@ class ClosedFormAngles:
                 out[b] = x.bodies[name].angle + since[b]
         return out
 
-    def _drawn(self, b: int) -> Any:
+    def _reference_angle(self, b: int) -> Any:
         names = {at: name for name, at in self.x.structure.place.items()}
         return 0.0 if b < 0 else self.x.bodies[names[b]].angle
 
@@ -339,7 +339,7 @@ class NamedEquations:
     traced: TracedEquations  # with rows for prescribed coordinates, which the engine does not have
     # The engine's coordinates: those of `trace_equations` minus their reference values.
     user_q: list[Any]
-    drawn: list[Any]  # these reference values
+    reference_values: list[Any]  # these reference values
     vdot: list[Node]
     places: list[CurveParameter]
     cleaned: TurnElimination
@@ -463,7 +463,7 @@ def state_by_symbol(
     """Arrays of the engine as values by symbol names."""
     T = x.traced
     out: dict[str, Any] = {T.t.data.name: t}
-    for symbol, drawn, value in zip(T.q, x.drawn, q, strict=True):
+    for symbol, drawn, value in zip(T.q, x.reference_values, q, strict=True):
         out[symbol.data.name] = _python_number(value + drawn.real)
     others = (*zip(T.v, v, strict=True), *zip(T.states, z, strict=False))
     return out | {symbol.data.name: _python_number(value) for symbol, value in others}

@@ -346,7 +346,7 @@ def measure_switches(s: Structure) -> None:
         for k, text in enumerate(w.along):
             coordinate_term(s, text, e, m, measured=True).index = k
             s.terms[-1].switch = w.label if w.summed else None
-        for a, b, formula in w.seen or w.path:
+        for a, b, formula in w.measured or w.path:
             measured_term(s, m, frame_index(s, e, a), frame_index(s, e, b), formula, 1.0, e)
 
 

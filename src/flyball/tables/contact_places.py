@@ -271,7 +271,7 @@ def _on_core(
     fields = _place(
         F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *half, r, 0.0, way, r + core.radius, 1.0), slips
     )
-    return fields | ({"seen": (corner_on_box.KIND_APART, *fields["gap"][1:])} if sharp else {})
+    return fields | ({"measured": (corner_on_box.KIND_APART, *fields["gap"][1:])} if sharp else {})
 
 
 @dataclass(frozen=True)

@@ -36,13 +36,13 @@ class ContactGroups:
         Owner -> its group.
     holds : dict
         Pair of groups -> the contact that applies to them; pairs that do not touch are not in it.
-    apart : set
+    excluded_pairs : set
         Pairs of single bodies, the first the smaller, that are nevertheless excluded.
     """
 
     of: Mapping[str, int]
     holds: Mapping[tuple[int, int], Contact]
-    apart: frozenset[tuple[str, str]]
+    excluded_pairs: frozenset[tuple[str, str]]
 
     def meets(self, group: int) -> int:
         """Groups that a group may touch, as bits."""

@@ -228,9 +228,9 @@ def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) ->
         rows.add(k, e)
     own = _concatenated(rows.own, (0, 2, 3))
     surfaces = Surfaces(surface_pairs(model, given, g, rows.surfaces), own[:, 0].copy(), own[:, 1].copy())
-    apart = np.array(sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.apart), np.int64).reshape(
-        -1, 2
-    )
+    apart = np.array(
+        sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.excluded_pairs), np.int64
+    ).reshape(-1, 2)
     geometry = ct.Geometry(
         _concatenated(rows.ints, (0, 9), np.int64),
         _concatenated(rows.reals, (0, 24)),
@@ -281,10 +281,10 @@ class _ShapeRows:
         ints, reals = np.zeros((count, n, 9), np.int64), np.zeros((count, n, 24))
         mine = np.zeros((n, 2, 3))
         for j, (s, form) in enumerate(forms):
-            f = form if where is None else form.carried(*where)
+            f = form if where is None else form.transformed(*where)
             reals[:, j] = _shape_numbers(f, com, sizes, self._places)
             ints[:, j] = self._ints(e, s, f, sizes)
-            mine[j] = self._own(e, s, where)
+            mine[j] = self._surface_velocity(e, s, where)
         ints[:, :, ct.MOVER] = movers[:, None]
         self.ints.append(ints.reshape(-1, 9))
         self.reals.append(reals.reshape(-1, 24))
@@ -309,7 +309,7 @@ class _ShapeRows:
             if self.model.planar:
                 return [g for f in s.outlines(n) for g in outline_forms(f)]
             p, R = s.pose(n)
-            return [g.carried(p, R) for f in s.forms(n) for g in finished_forms(f)]
+            return [g.transformed(p, R) for f in s.forms(n) for g in finished_forms(f)]
         except ModelError as error:
             raise type(error)(f"{e.title}: {error}") from None
 
@@ -335,7 +335,7 @@ class _ShapeRows:
         row[:, ct.MATERIAL] = list(self.surfaces).index(surface)
         return row
 
-    def _own(self, e: Owner, s: Solid, where: tuple | None) -> np.ndarray:
+    def _surface_velocity(self, e: Owner, s: Solid, where: tuple | None) -> np.ndarray:
         name = s.material or e.material
         out = surface_motion(self.model.find(name) if name else None, self.given.of)  # type: ignore[arg-type]
         return out if where is None else out @ where[1].T

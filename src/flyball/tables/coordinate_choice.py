@@ -62,7 +62,7 @@ def spanning_joints(model: Model, avoided: Collection[str] = ()) -> tuple[str, .
         Joints that must stay rows.
     """
     model = model.snapshot()
-    return model.kept.get(
+    return model.cache.get(
         "spanning", (tuple(avoided), point_masses(model)), MAX_FORESTS, lambda: _spanning_forest(model, avoided)
     )
 

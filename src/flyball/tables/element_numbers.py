@@ -71,7 +71,7 @@ def element_numbers(model: Model, parameters: Mapping[str, Any] | None = None) -
     if kind is object:
         return _evaluated(model, env, object())
     key = told, read
-    return model.kept.get("numbers", key, MAX_CACHED, lambda: _updated(model, env, key))
+    return model.cache.get("numbers", key, MAX_CACHED, lambda: _updated(model, env, key))
 
 
 def _environment(model: Model, parameters: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
@@ -79,7 +79,7 @@ def _environment(model: Model, parameters: Mapping[str, Any]) -> tuple[Mapping[s
     if not all(type(x) in EXACT_TYPES for x in parameters.values()):
         return _with_bits(model.environment(parameters))
     written = tuple((name, type(x), repr(x)) for name, x in parameters.items())
-    return model.kept.get("environment", written, MAX_CACHED, lambda: _with_bits(model.environment(parameters)))
+    return model.cache.get("environment", written, MAX_CACHED, lambda: _with_bits(model.environment(parameters)))
 
 
 def _with_bits(env: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
@@ -92,15 +92,15 @@ def _updated(model: Model, env: Mapping[str, Any], key: Hashable) -> ElementNumb
 
     Only elements that name a changed parameter are evaluated again.
     """
-    first: ElementNumbers | None = model.kept.known("first numbers")
+    first: ElementNumbers | None = model.cache.known("first numbers")
     if first is None or first.key[1] != key[1]:  # type: ignore[index]
         new = _evaluated(model, env, key)
         if new.dtype is not float:
             return new
-        model.kept.drop("first numbers", None)  # outdated: files have changed
-        model.kept.get("first numbers", None, 1, lambda: new)
+        model.cache.drop("first numbers", None)  # outdated: files have changed
+        model.cache.get("first numbers", None, 1, lambda: new)
         return new  # another thread may have stored others in the meantime
-    named = model.kept.get("named", None, 1, lambda: _parameters_of_elements(model))
+    named = model.cache.get("named", None, 1, lambda: _parameters_of_elements(model))
     other = {k for k, x in env.items() if not _same_bits(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
     of = _with_needed_elements(model, {**first.of, **{e.name: _checked_fields(e, env) for e in changed}})
@@ -185,7 +185,7 @@ def _body_numbers(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar:
 
 def shape_files(model: Model) -> tuple[str, ...]:
     """Files that shapes are read from."""
-    return model.kept.get(
+    return model.cache.get(
         "files",
         None,
         1,

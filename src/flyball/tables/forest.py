@@ -42,13 +42,13 @@ CENTRED = 1e-9  # relative to the distance from the world's origin: by how much 
 def point_mass_obstacles(model: Model) -> Mapping[str, str]:
     """Bodies without inertia -> why each is no point mass; "" for a point mass."""
     model = model.snapshot()
-    return model.kept.get("points", None, 1, lambda: _point_mass_obstacles(model))
+    return model.cache.get("points", None, 1, lambda: _point_mass_obstacles(model))
 
 
 def point_masses(model: Model) -> frozenset[str]:
     """Names of the point masses: the only result that structures take from parameter values."""
     model = model.snapshot()
-    return model.kept.get(
+    return model.cache.get(
         "single", None, 1, lambda: frozenset(k for k, why in point_mass_obstacles(model).items() if not why)
     )
 

@@ -97,19 +97,19 @@ def forces_in_events(model: Model) -> dict[str, TransmittedForce]:
 def number_force_readings(s: Structure) -> None:
     """Number the columns of forces that events name."""
     for name, x in forces_in_events(s.model).items():
-        first = s.reads.setdefault(x.element.name, force_reading_count(s))
+        first = s.sensed_columns.setdefault(x.element.name, force_reading_count(s))
         s.slots[name] = FORCE_READING_CODE - first - x.column
 
 
 def force_reading_count(s: Structure) -> int:
     """Number of columns of forces that events name."""
-    return sum(len(WRENCH if isinstance(s.model[name], Joint) else EFFORTS) for name in s.reads)
+    return sum(len(WRENCH if isinstance(s.model[name], Joint) else EFFORTS) for name in s.sensed_columns)
 
 
 def force_reading_entries(s: Structure) -> list[tuple[int, int]]:
     """Rows of `LoadTerms` for forces that events name: (column, term or code of another source)."""
     first = 2 * len(s.measured) + len(s.loads)
-    return [(first + at, what) for name, at in s.reads.items() for what in _reading_terms(s, s.model[name])]
+    return [(first + at, what) for name, at in s.sensed_columns.items() for what in _reading_terms(s, s.model[name])]
 
 
 def _reading_terms(s: Structure, e: Element) -> list[int]:
@@ -143,7 +143,7 @@ def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str,
 def nonsmooth_elements(model: Model) -> list[Element]:
     """Elements whose laws have nonsmooth points where the state decides."""
     return (
-        model.kept.get("bent laws", None, 1, lambda: _nonsmooth_elements(model))
+        model.cache.get("bent laws", None, 1, lambda: _nonsmooth_elements(model))
         if model.frozen
         else _nonsmooth_elements(model)
     )

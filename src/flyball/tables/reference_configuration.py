@@ -52,9 +52,9 @@ class Refresh:
         """Differences from existing tables of the same structure."""
         if base is None or base.given.since is not given.since:
             return cls()
-        stand_on = model.kept.get("stand on", None, 1, lambda: _dependents(model))
+        stand_on = model.cache.get("stand on", None, 1, lambda: _dependents(model))
         other = given.changed | base.given.changed
-        acting = model.kept.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
+        acting = model.cache.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
     def table(self, name: str, new: T, dtype: Any) -> T:
@@ -71,7 +71,7 @@ class Refresh:
         """Numbers of the rows of a table ("frames", "terms" or "forces") that are computed again."""
         if self.base is None:
             return range(len(getattr(s, table)))
-        of = s.kept.get("rows of elements", table, 3, lambda: _rows_of_elements(getattr(s, table)))
+        of = s.cache.get("rows of elements", table, 3, lambda: _rows_of_elements(getattr(s, table)))
         return sorted({k for name in self.names for k in of.get(name, ())})
 
     def asks(self, *elements: Any) -> bool:
@@ -144,10 +144,10 @@ class Poses:
         key = f.element.name, f.role, f.coordinate
         found = self._given.world.get(key)
         if found is None:
-            found = self._given.world[key] = self._drawn(f)
+            found = self._given.world[key] = self._local_frame(f)
         return found
 
-    def _drawn(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
+    def _local_frame(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         e = f.element
         n = self.numbers[e.name]
         end = e.ends()[f.role]
@@ -185,7 +185,7 @@ class Poses:
         points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
         return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
 
-    def apart(self, e: Any) -> float:
+    def frame_separation(self, e: Any) -> float:
         """`separation` of an element that has several frames; 0 of others."""
         return self.separation(e) if hasattr(e, "ends") and len(e.ends()) > 1 else 0.0
 
@@ -201,7 +201,7 @@ class Poses:
         turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
         return (matrix_product(R, np.array(turn)) if len(turn) else R)[:, 2]
 
-    def drawn(self, t: TermSpec) -> float:
+    def term_value(self, t: TermSpec) -> float:
         """Value of a term's formula in the reference configuration."""
         poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
         F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)

@@ -231,10 +231,10 @@ def structure(model: Model, choices: Choices = DEFAULT_CHOICES) -> Structure:
     """
     model = model.snapshot()
     key = choices, point_masses(model)
-    found = model.kept.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
+    found = model.cache.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
     if is_outdated(found):
-        model.kept.drop("structure", key)
-        found = model.kept.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
+        model.cache.drop("structure", key)
+        found = model.cache.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
     return found
 
 

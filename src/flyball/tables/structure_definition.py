@@ -104,7 +104,9 @@ class Structure:
     # controller, state, law, whether it comes last
     sampled: list[tuple[str, int, int, bool]] = field(default_factory=list)
     loads: list[Force] = field(default_factory=list)  # forces that depend on the load of their joint
-    reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its first column, from 0
+    sensed_columns: dict[str, int] = field(
+        default_factory=dict
+    )  # element whose force events name -> its first column, from 0
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, Any] = field(default_factory=dict)  # integers of `System`, by its fields
     code: list[int] = field(default_factory=list)
@@ -114,7 +116,7 @@ class Structure:
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1
     ldl: LDLPattern = None  # type: ignore[assignment]
-    kept: ResultCache = field(
+    cache: ResultCache = field(
         default_factory=ResultCache, init=False
     )  # cached values of it, and their cost; a changed copy has its own
 
@@ -197,7 +199,7 @@ def velocity_names(s: Structure) -> list[VelocityName]:
     the plane; in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not have.
     Tree joints: the joint's coordinates; a coordinate without a name is a ``turn`` or ``shift`` along an axis.
     """
-    return s.kept.get("names of velocities", None, 1, lambda: _velocity_names(s))
+    return s.cache.get("names of velocities", None, 1, lambda: _velocity_names(s))
 
 
 def _velocity_names(s: Structure) -> list[VelocityName]:

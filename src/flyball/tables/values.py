@@ -75,7 +75,7 @@ class Values:
     given: ElementNumbers
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # frames in the reference configuration
-    kept: ResultCache = field(
+    cache: ResultCache = field(
         default_factory=ResultCache, init=False
     )  # initial states of motions; a changed copy has its own
     alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
@@ -104,7 +104,7 @@ class Values:
         return self if self.alike is None else self.alike
 
     @property
-    def told(self) -> dict[str, float]:
+    def parameter_values(self) -> dict[str, float]:
         """Values of the parameters used."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
@@ -142,19 +142,19 @@ def values_of(s: Structure, n: ElementNumbers, holds: Mapping[str, complex] | No
     """Numbers of a mechanism from the numbers of its elements."""
     if n.dtype is not float or (holds and number_type(holds.values()) is not float):
         return _fill(s, n, holds or {})
-    return s.kept.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
+    return s.cache.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
 
 
 def _fill(s: Structure, given: ElementNumbers, holds: Mapping[str, Any]) -> Values:
     """Compute all tables; where some exist already, only the rows that differ."""
     if holds:
         return _fill_all(s, given, holds, Refresh())
-    first = s.kept.known("filled first")
+    first = s.cache.known("filled first")
     new = Refresh.since(first, given, s.model)
     x = _fill_forces(s, given, new) if new.forces_only and given.dtype is float else None
     x = x or _fill_all(s, given, holds, new)
     if first is None and given.dtype is float:
-        s.kept.get("filled first", None, 1, lambda: x)
+        s.cache.get("filled first", None, 1, lambda: x)
     return x
 
 
@@ -172,7 +172,7 @@ def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Value
         return None
     forces = _force_parameters(s, pose, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
     of_switches = refresh.table("switch_numbers", S.switch_numbers, dtype)
-    constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.apart)
+    constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.frame_separation)
     S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
     x = Values(s, S, base.q, base.v, given, base.length, pose)
     x.alike = base
@@ -195,7 +195,7 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         s, pose, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
     )
     of_switches = refresh.table("switch_numbers", zero_table(SwitchNumbers, len(s.switches), dtype), dtype)
-    constraint_rows.fill_switch_numbers(s, numbers, of_switches, refresh.asks, pose.apart)
+    constraint_rows.fill_switch_numbers(s, numbers, of_switches, refresh.asks, pose.frame_separation)
     semidefinite = float((table.excess_inertia != 0.0).any() or (table.excess_mass != 0.0).any())
     gravity = model.gravity_vector(env)
     pace = characteristic_rate(given, model, gravity, length)
@@ -369,7 +369,7 @@ def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> 
     """Reference value of a coupled coordinate: its value in the reference configuration, unless the sum is given."""
     total = e.total(n)
     if total is None:
-        return pose.drawn(t)
+        return pose.term_value(t)
     share = total / e.first_weight(n) if t.index == 0 else 0.0
     return t.sign * (share - _offset(t, pose.numbers))
 
@@ -377,7 +377,7 @@ def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> 
 def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, refresh: Refresh) -> np.ndarray:
     for k in refresh.rows(s, "forces"):
         e = s.forces[k]
-        par = e.parameters(pose.numbers[e.name], pose.apart(e))
+        par = e.parameters(pose.numbers[e.name], pose.frame_separation(e))
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")
         x[k], x[k, : len(par)] = 0.0, par

@@ -489,5 +489,5 @@ def _subject(
         ends = x.poses.ends(e)
         states = [s for r in _constraint_rows(e) for s in row_states(r, e.row_parameters(n, r, *ends)[:6])]
         return Subject(e, make, given is None, m, n, 0.0, ends, states)
-    separation = float(x.poses.apart(e))
+    separation = float(x.poses.frame_separation(e))
     return Subject(e, make, given is None, m, n, separation, (), force_states(e, e.parameters(n, separation)))

@@ -120,7 +120,7 @@ def _point_motion(result: Result, point: PointRequest) -> tuple[str, tuple[np.nd
         p[: len(local)] = local
         x = result.values
         offset = tuple((p - x.bodies[body].com.real).tolist())
-        record = result.records.carried(x.structure.place[body], offset, tuple(np.eye(3).ravel()))
+        record = result.records.attached(x.structure.place[body], offset, tuple(np.eye(3).ravel()))
         name = f"{body} ({', '.join(f'{c:g}' for c in local)})"
     full = [np.stack([np.broadcast_to(c, len(result.t)) for c in record[k]], axis=1) for k in (0, 3, 5)]
     return name, (full[0], full[1], full[2])

@@ -479,11 +479,11 @@ def _figure_columns(chosen: Sequence[Figure]) -> str:
     """Return two columns of figures of nearly equal height; each figure has its index for a single column."""
     heights = [HEADING_HEIGHT + sum(1.0 + bool(p.note) * NOTE_HEIGHT for p in f.panels) for f in chosen]
 
-    def apart(right: tuple[bool, ...]) -> float:
+    def height_difference(right: tuple[bool, ...]) -> float:
         return abs(sum(-h if aside else h for h, aside in zip(heights, right, strict=True)))
 
     sides = product((False,), *[(False, True)] * (len(chosen) - 1)) if chosen else ()
-    best = min(sides, key=apart, default=())
+    best = min(sides, key=height_difference, default=())
     columns = ("".join(_figure_html(f, k) for k, f in enumerate(chosen) if best[k] is aside) for aside in (False, True))
     return "".join(f'<div class="column">{plots}</div>' for plots in columns)
 

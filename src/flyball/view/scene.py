@@ -121,7 +121,7 @@ def contact_arrows(result: Result, every: np.ndarray) -> tuple[RecordedContacts 
     contacts = result.contacts
     if contacts is None or not len(contacts):
         return None, ""
-    rows = contacts.taken(every)
+    rows = contacts.at_times(every)
     note = ""
     begin, pair, point, force, state = rows.begin, rows.pair, rows.point, rows.force, rows.state
     if len(rows) > MAX_CONTACT_ARROWS:

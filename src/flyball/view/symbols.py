@@ -66,14 +66,14 @@ class AttachedFrames:
         full = [np.broadcast_to(c, n) for c in (*p, *R)]
         return np.stack(full[:3], axis=1), np.stack(full[3:], axis=1).reshape(-1, 3, 3)
 
-    def seen(self, end: AttachedFrame, other: AttachedFrame) -> np.ndarray:
+    def relative_origin(self, end: AttachedFrame, other: AttachedFrame) -> np.ndarray:
         """Return the origin of the other frame relative to the first, in its axes, over time (n, 3)."""
         (p, R), (q, _) = self.track(end), self.track(other)
         return np.einsum("nij,ni->nj", R, q - p)
 
     def reach(self, end: AttachedFrame, other: AttachedFrame) -> tuple[float, float, float, float, float, float]:
         """Return the ranges of the other frame's origin along x, y, z of the first: low x, high x, low y, ..."""
-        d = self.seen(end, other)
+        d = self.relative_origin(end, other)
         d = d[np.isfinite(d).all(axis=1)]
         if not len(d):
             return (0.0,) * 6
@@ -379,7 +379,10 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
     numbers = places.result.values.numbers[e.name]
     if kind == "link":
         yield _link_line(e, places, every)
-    elif kind == "universal" and np.abs(places.seen(F, M)).max(initial=0.0) > 1e-6 * places.result.values.length:
+    elif (
+        kind == "universal"
+        and np.abs(places.relative_origin(F, M)).max(initial=0.0) > 1e-6 * places.result.values.length
+    ):
         yield _link_line(e, places, every)  # a massless link with a hinge at each end
         yield _joint_symbol(e, "revolute", F, M, places)
         yield _joint_symbol(e, "revolute", M, F, places)
@@ -420,7 +423,7 @@ def wheel_radius(e: Any, places: AttachedFrames) -> float:
         return float(n.radius) + float(getattr(n, "tread", 0.0))
     ends = places.ends(e)
     assert ends is not None
-    return float(np.sqrt((places.seen(*ends)[:1, :2] ** 2).sum()))
+    return float(np.sqrt((places.relative_origin(*ends)[:1, :2] ** 2).sum()))
 
 
 def cam_outline(n: Any) -> np.ndarray | None:

@@ -118,10 +118,10 @@ def c_sources(
     known = spline_tables(routines, Identifiers(KEYWORDS + list(HELPERS)))
 
     def call(f: Function, args: Sequence[str]) -> str:
-        t = known[id(f.told["value"])]
+        t = known[id(f.details["value"])]
         if not t.moved:
-            return f"spline({t.name}, {f.told['order']}, {args[0]})"
-        return f"{t.name}_with({f.told['order']}, {args[0]}, (const double[]){{{', '.join(args[1:])}}})"
+            return f"spline({t.name}, {f.details['order']}, {args[0]})"
+        return f"{t.name}_with({f.details['order']}, {args[0]}, (const double[]){{{', '.join(args[1:])}}})"
 
     language = Language(literal, FUNCTIONS, call)
     told = {f"{name}_{k}": x for k, x in (constants or {}).items() if x}

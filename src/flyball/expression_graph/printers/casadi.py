@@ -78,15 +78,15 @@ def _operation(ca: Any, functions: dict[str, Callable[..., Any]], x: Node, args:
 
 def _table_value(ca: Any, f: Function, args: Sequence[Any]) -> Any:
     """Value of a table: the segment is found by bisection."""
-    if "constant" in f.told:
-        return f.told["constant"]
-    data: list[Any] = list(f.told["table"])
-    for k, x in zip(f.told["moved"], args[1:], strict=True):
+    if "constant" in f.details:
+        return f.details["constant"]
+    data: list[Any] = list(f.details["table"])
+    for k, x in zip(f.details["moved"], args[1:], strict=True):
         data[k] = x
-    count, order, period = int(f.told["table"][1]), f.told["order"], data[0]
+    count, order, period = int(f.details["table"][1]), f.details["order"], data[0]
     breaks = data[BREAKS : BREAKS + count]
     u, shift = args[0], 0.0
-    if f.told["table"][0] > 0.0:
+    if f.details["table"][0] > 0.0:
         shift = period * ca.floor((u - breaks[0]) / period)
         u = u - shift
 

@@ -121,7 +121,7 @@ class Term:
         return self.number == ExactNumber(1, 1)
 
     @property
-    def plain(self) -> bool:
+    def is_number(self) -> bool:
         """Whether the term is a number only."""
         return not self.above and not self.below
 

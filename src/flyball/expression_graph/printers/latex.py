@@ -107,7 +107,7 @@ class LatexPrinter:
         """A function; without parentheses if its argument is one symbol."""
         if len(x.args) == 1 and (x.args[0].op == SYMBOL or x.args[0].index in self.layout.names):
             return f"{operator} {self.expression(x.args[0])}"
-        return f"{operator}{self.parentheses(', '.join(map(self.apart, x.args)))}".replace(BREAK, "")
+        return f"{operator}{self.parentheses(', '.join(map(self.delimited, x.args)))}".replace(BREAK, "")
 
     def factor(self, x: Node) -> str:
         """Any other factor without its exponent."""
@@ -123,19 +123,19 @@ class LatexPrinter:
         if x.op == "choose":
             return self.parentheses(self.cases(x))
         if x.op == "call":
-            primes = "'" * x.data.told.get("order", 0)
+            primes = "'" * x.data.details.get("order", 0)
             return rf"\operatorname{{{latex_escaped(x.data.name)}}}{primes}" + self.parentheses(
-                ", ".join(map(self.apart, x.args))
+                ", ".join(map(self.delimited, x.args))
             )
         return self.parentheses(self.expression(x))
 
-    def apart(self, x: Node) -> str:
+    def delimited(self, x: Node) -> str:
         """An expression that stands next to others, in parentheses if necessary."""
         return self.power((x, 1)) if x.op == "choose" else self.expression(x)
 
     def cases(self, x: Node) -> str:
         """Cases of a condition; they have no closing delimiter."""
-        c, a, b = map(self.apart, x.args)
+        c, a, b = map(self.delimited, x.args)
         return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
 
     @staticmethod

@@ -116,8 +116,8 @@ def search_key(table: Sequence[float]) -> SearchKey:
 
 def spline_of(data: Any) -> tuple[Sequence[float], int] | None:
     """Numbers of a spline and the order of its derivative; None if it is no spline or its numbers are not constant."""
-    told = getattr(data, "told", {})
-    return (told["table"], told["order"]) if "table" in told and not told["moved"] else None
+    details = getattr(data, "details", {})
+    return (details["table"], details["order"]) if "table" in details and not details["moved"] else None
 
 
 class SplineSegments:
@@ -274,7 +274,7 @@ class Procedure:
     Attributes
     ----------
     name : str
-    reads : mapping of node index to place
+    inputs : mapping of node index to place
         Available values: symbols, and results of other procedures.
     stores : list of (place, expression)
     returned : node or number
@@ -286,7 +286,7 @@ class Procedure:
     """
 
     name: str
-    reads: Mapping[int, Place]
+    inputs: Mapping[int, Place]
     stores: list[tuple[Place, Any]]
     returned: Any = 0.0
     checks: list[tuple[list[Any], str, float]] = field(default_factory=list)
@@ -330,12 +330,12 @@ class Module:
 
     def add(self, p: Procedure) -> None:
         """Print a procedure."""
-        out = _Lines(self, p.reads)
-        order = depth_first(p.results, p.reads) if p.deep else ordered_operations(p.results, p.reads)
-        out.chains = parallel_chains(order, p.reads)
+        out = _Lines(self, p.inputs)
+        order = depth_first(p.results, p.inputs) if p.deep else ordered_operations(p.results, p.inputs)
+        out.chains = parallel_chains(order, p.inputs)
         overwritten = {place for place, _ in p.stores}
         for x in order:  # values that will be overwritten are read first
-            if p.reads.get(x.index) in overwritten:
+            if p.inputs.get(x.index) in overwritten:
                 out.value(x)
         waiting: dict[int, list[Place]] = {}
         for place, x in p.stores:
@@ -425,9 +425,9 @@ class _Lines:
         if (spline := spline_of(x.data)) is not None:
             numbers, order = spline
             return self.pieces.value((self.module.table(numbers), numbers), order, a[0])
-        told = getattr(x.data, "told", {})
-        if "constant" in told:
-            return constant(told["constant"])
+        details = getattr(x.data, "details", {})
+        if "constant" in details:
+            return constant(details["constant"])
         raise UnsupportedOperation(getattr(x.data, "name", x.op))
 
     def largest(self, started: Node | None, others: Sequence[Node]) -> str:

@@ -90,7 +90,7 @@ class Converter:
             return made
         return self.element()
 
-    def plain(self) -> str:
+    def text_argument(self) -> str:
         """An argument as text."""
         if self.skipped() != "{":
             return self.next()
@@ -154,11 +154,11 @@ class Converter:
         if name in ACCENTS:
             return f'<mover accent="true">{self.argument()}<mo stretchy="false">{ACCENTS[name]}</mo></mover>'
         if name == "operatorname":
-            return THIN + self.named(f"<mi>{escape(self.plain())}</mi>")
+            return THIN + self.named(f"<mi>{escape(self.text_argument())}</mi>")
         if name in STYLES:
             return self.styled(STYLES[name])
         if name in TEXTS:
-            return f"<mtext>{escape(self.plain())}</mtext>"
+            return f"<mtext>{escape(self.text_argument())}</mtext>"
         return "" if name in NOTHING else self.structure(name)
 
     def named(self, base: str) -> str:
@@ -169,7 +169,7 @@ class Converter:
     def styled(self, style: str) -> str:
         """Letters in another style."""
         if style != "bold":
-            return f'<mi style="font-style:{style}">{escape(self.plain())}</mi>'
+            return f'<mi style="font-style:{style}">{escape(self.text_argument())}</mi>'
         return re.sub(r"<mi[^>]*>(.)</mi>|<mn>(\d)</mn>", lambda m: f"<mi>{heavy(m[1] or m[2])}</mi>", self.argument())
 
     def structure(self, name: str) -> str:
@@ -186,7 +186,7 @@ class Converter:
         if name in ("Bigl", "Bigr"):
             return f'<mo minsize="1.9em" maxsize="1.9em" stretchy="true">{escape(self.next())}</mo>'
         if name == "begin":
-            return self.table(self.plain())
+            return self.table(self.text_argument())
         return f"<mtext>{escape(name)}</mtext>"
 
     @staticmethod
@@ -198,7 +198,7 @@ class Converter:
     def table(self, kind: str) -> str:
         """An environment of cells."""
         if kind == "array":
-            self.plain()  # column alignment
+            self.text_argument()  # column alignment
         rows, cells = [], []
         while self.at < len(self.tokens):
             cells.append(f"<mtd>{self.row('&', chr(92) * 2, chr(92) + 'end')}</mtd>")
@@ -208,7 +208,7 @@ class Converter:
                 cells = []
             if token == r"\end":
                 break
-        self.plain()
+        self.text_argument()
         if rows and re.fullmatch(r"<mtr><mtd><mrow></mrow></mtd></mtr>", rows[-1]):
             rows.pop()
         made = f'<mtable class="{escape(kind)}">{"".join(rows)}</mtable>'

@@ -72,11 +72,11 @@ def numba_module(routines: Sequence[Routine], head: str, constants: Mapping[str,
     known = spline_tables(routines, Identifiers([*keyword.kwlist, *HELPERS, *[r.name for r in routines]]))
 
     def call(f: Function, args: Sequence[str]) -> str:
-        t = known[id(f.told["value"])]
+        t = known[id(f.details["value"])]
         if not t.moved:
-            return f"_spline({t.name}, {f.told['order']}, {args[0]})"
+            return f"_spline({t.name}, {f.details['order']}, {args[0]})"
         numbers = "".join(x + ", " for x in args[1:])
-        return f"_spline_with({t.name}, {f.told['order']}, {args[0]}, {t.moved!r}, ({numbers}))"
+        return f"_spline_with({t.name}, {f.details['order']}, {args[0]}, {t.moved!r}, ({numbers}))"
 
     language = Language(literal, FUNCTIONS, call)
     body = "".join(_function(r, language) for r in routines)

@@ -128,9 +128,9 @@ def python_module(routines: Sequence[Routine], head: str, constants: Mapping[str
     def call(f: Function, args: Sequence[str]) -> str:
         if id(f) in told:
             return f"_called({', '.join([repr(told[id(f)][0]), *args])})"
-        t = known[id(f.told["value"])]
+        t = known[id(f.details["value"])]
         moved = [repr(t.moved), *args[1:]] if t.moved else []
-        return f"_spline({', '.join([t.name, str(f.told['order']), args[0], *moved])})"
+        return f"_spline({', '.join([t.name, str(f.details['order']), args[0], *moved])})"
 
     language = Language(literal, FUNCTIONS, call)
     body = "".join(_function(r, language) for r in routines)

@@ -180,9 +180,9 @@ def spline_tables(routines: Iterable[Routine], names: Identifiers) -> dict[int, 
     """Tables that routines call, by the identity of the function for their value."""
     found: dict[int, Table] = {}
     for f in called_functions(routines):
-        if "table" in f.told and id(f.told["value"]) not in found:
+        if "table" in f.details and id(f.details["value"]) not in found:
             name = names(f"table_{len(found) + 1}")
-            found[id(f.told["value"])] = Table(name, tuple(f.told["table"]), tuple(f.told["moved"]))
+            found[id(f.details["value"])] = Table(name, tuple(f.details["table"]), tuple(f.details["moved"]))
     return found
 
 
@@ -190,7 +190,7 @@ def python_functions_of(routines: Iterable[Routine], names: Identifiers) -> dict
     """Python functions that routines call: identity -> (unique name, function)."""
     found = {}
     for f in called_functions(routines):
-        if "table" not in f.told and "constant" not in f.told:
+        if "table" not in f.details and "constant" not in f.details:
             found[id(f)] = names(f.name), f
     return found
 
@@ -210,8 +210,8 @@ def refuse_python_functions(routines: Sequence[Routine], language: str) -> None:
     """
     for r in routines:
         for f in r.used():
-            if "table" not in f.told and "constant" not in f.told:
-                of = f.told.get("of")
+            if "table" not in f.details and "constant" not in f.details:
+                of = f.details.get("of")
                 raise ModelError(
                     f"{of + ': ' if of else ''}{f.name!r} is a Python function, and {r.name} calls it: {language} "
                     "supports expressions and tables only. Write the law as an expression, give a table of points in "
@@ -320,8 +320,8 @@ def operation_text(language: Language, x: Node, args: Sequence[CodeFragment]) ->
         return CodeFragment(f"{a.bare(PRODUCT)} / {b.bare(ATOM)}", PRODUCT, a.negative != b.negative)
     texts = [a.whole for a in args]
     if x.op == CALL:
-        if "constant" in x.data.told:
-            return fragment_of_number(language, x.data.told["constant"])
+        if "constant" in x.data.details:
+            return fragment_of_number(language, x.data.details["constant"])
         return CodeFragment(language.call(x.data, texts))
     return CodeFragment(language.functions[x.op].format(*texts))
 

@@ -288,7 +288,7 @@ class SympyPrinter:
 
     def _called_by_name(self, x: Node, args: list[Any]) -> Any:
         """A table as ``Piecewise`` if requested; else a named function with SymPy derivatives."""
-        told, order = x.data.told, 0
+        told, order = x.data.details, 0
         if "table" in told:
             order = told["order"]
             if self.tables == "piecewise" and not told["moved"]:

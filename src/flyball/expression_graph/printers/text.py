@@ -96,7 +96,7 @@ class TextPrinter:
         if x.op == "choose":
             c, a, b = (self.expression(y) for y in x.args)
             return f"({a} if {c} > 0 else {b})"
-        name = x.data.shown if x.op == "call" else NAMES.get(x.op, x.op)
+        name = x.data.printed_name if x.op == "call" else NAMES.get(x.op, x.op)
         return f"{name}({', '.join(self.expression(y) for y in x.args)})"
 
 

@@ -56,7 +56,7 @@ class ConvexPart:
     sides: int = 0
     owner: type | None = None
 
-    def carried(self, p: np.ndarray, R: np.ndarray) -> ConvexPart:
+    def transformed(self, p: np.ndarray, R: np.ndarray) -> ConvexPart:
         """Return the part in a frame in which the shape's own frame is at p with the axes R."""
         return replace(self, place=p + R @ self.place, axes=R @ self.axes)
 

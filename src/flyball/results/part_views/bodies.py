@@ -32,11 +32,11 @@ class FrameView(PartView):
     @cached_property
     def _moving(self) -> KinematicRecord:
         """Return its record without accelerations."""
-        return self._result.motions.carried(*self._placed)
+        return self._result.motions.attached(*self._placed)
 
     @cached_property
     def _record(self) -> KinematicRecord:
-        return self._result.records.carried(*self._placed)
+        return self._result.records.attached(*self._placed)
 
     @property
     def position(self) -> np.ndarray:

@@ -270,7 +270,7 @@ class EventActions:
     first: int = 0
     tables: Values | None = None  # before
 
-    def told(self, labels: Sequence[str] = ()) -> None:
+    def record_events(self, labels: Sequence[str] = ()) -> None:
         """Record the events with what was done; jumps that only the events caused (locks, impulses) are included in the
         record.
 
@@ -306,7 +306,7 @@ class EventActions:
 def _guards_of_forces(here: EventContext) -> frozenset[int]:
     """Return the guards of events that name forces: these may jump across zero at any event."""
     s = here.structure
-    found: frozenset[int] = s.kept.get("events of forces", 0, 1, lambda: _find_guards_of_forces(s))
+    found: frozenset[int] = s.cache.get("events of forces", 0, 1, lambda: _find_guards_of_forces(s))
     return found
 
 
@@ -385,7 +385,7 @@ def _perform(here: EventContext, events: tuple[Event, ...], unknown: frozenset[i
 def event_expression(here: EventContext, g: int) -> float:
     """Return the value of an event's expression, by its guard, at the state last evaluated."""
     model, e = here.structure.model, here.structure.events[g]
-    law = here.structure.kept.get(
+    law = here.structure.cache.get(
         "law of event", g, MOST_EXPRESSIONS, lambda: model.law(e.law, e.of, f"when of {e.title}")
     )
     return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))

@@ -242,7 +242,7 @@ class PhaseRecorder:
             )
         )
 
-    def told(self, result: Result) -> None:
+    def add_phases(self, result: Result) -> None:
         """Add the phases, and the energy exchanged by events, to a result, if anything can switch."""
         s = result.values.structure
         if not s.switches and not s.guards and not s.model.events:

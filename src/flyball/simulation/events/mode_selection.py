@@ -353,7 +353,7 @@ def held_rates(n: InstantProblem, found: ModeDecision) -> tuple[int, ...]:
 def _rates_in_events(n: InstantProblem) -> list[int]:
     """Return measured quantities whose rates are named in event expressions."""
     s = n.here.structure
-    found: list[int] = s.kept.get("rates of events", 0, 1, lambda: _find_rates_in_events(s))
+    found: list[int] = s.cache.get("rates of events", 0, 1, lambda: _find_rates_in_events(s))
     return found
 
 

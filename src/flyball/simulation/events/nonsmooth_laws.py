@@ -154,7 +154,7 @@ class CornerProblem(NamedTuple):
     size: np.ndarray
     sides: np.ndarray
     held: np.ndarray
-    left: np.ndarray
+    pending: np.ndarray
 
 
 class Corners:
@@ -342,10 +342,10 @@ class Corners:
         flat = ~held & (np.abs(found.d + found.B @ sides) <= np.maximum(LEVEL_RATE * found.size, slow))
         if held.any():
             self._hold([s for s, h in zip(which, held, strict=True) if h], found)
-        for k in np.flatnonzero(flat & ~found.left):
+        for k in np.flatnonzero(flat & ~found.pending):
             self._choose_side_by_trial(which, int(k), sides, self.sides[which])
         if len(which) > 1:
-            self._refuse_unresolved([s for s, going in zip(which, ~held & ~found.left, strict=True) if going], found)
+            self._refuse_unresolved([s for s, going in zip(which, ~held & ~found.pending, strict=True) if going], found)
         n.run_engine(MOTION)
         return bool(found.B.any())
 

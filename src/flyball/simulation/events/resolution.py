@@ -218,7 +218,7 @@ def resolve_start(here: EventContext) -> None:
         refuse_violated(n)
         resolve_jumps_and_corners(n, corners, np.zeros(0, np.int64), record=False)
         record_initial_breaks(n)
-    acts.told(["start"])
+    acts.record_events(["start"])
     _resolve_chain(here, acts.passed())
 
 
@@ -246,7 +246,7 @@ def _resolve_chain(here: EventContext, fired: np.ndarray) -> None:
         if len(here.c.system.switches.row) or here.external_impulse is not None:
             n = instant_problem(here)
             resolve_jumps_and_corners(n, Corners(n), fired)
-        acts.told(["start"])
+        acts.record_events(["start"])
         fired = acts.passed()
         here.settled_keys.clear()  # events caused by these actions count as later
         if not len(fired) or here.stopped:

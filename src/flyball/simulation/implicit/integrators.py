@@ -73,9 +73,9 @@ class ImplicitIntegrator:
         self.c, self.stages = GUARD_POINTS, len(GUARD_POINTS)
         self.layout = x = jacobian_layout(s, S, index_3)
         self.width, self.system = x.width, S
-        self.light = c.values.kept.get("light", None, 1, lambda: substitute_inertias(c))
+        self.light = c.values.cache.get("light", None, 1, lambda: substitute_inertias(c))
         key = type(self).__name__, index_3, self.light.tobytes(), int(S.flat[SCRATCH])
-        self.own: PooledBuffer = s.kept.get(
+        self.own: PooledBuffer = s.cache.get(
             "implicit steps", key, MOST_POOLS, lambda: self._workspace_pool(clock.y.shape[1])
         ).new()
         initialise_work(s, self._complex_tables(S).fields, lambda name: self.own.array(f"WC.{name}"))
@@ -121,7 +121,7 @@ class ImplicitIntegrator:
 
     def _complex_tables(self, S: System) -> StructBuffer:
         """Return the tables in complex numbers, shared by all runs with these tables."""
-        return self.layout.s.kept.get("stepped", id(S), MOST_POOLS, lambda: (S, StructBuffer(complex_system(S))))[1]
+        return self.layout.s.cache.get("stepped", id(S), MOST_POOLS, lambda: (S, StructBuffer(complex_system(S))))[1]
 
     @property
     def failed(self) -> SimulationError | None:
@@ -173,7 +173,7 @@ class ImplicitIntegrator:
 
     def _steep_laws(self) -> list[str]:
         s = self.layout.s
-        return s.kept.get("steep laws", None, 1, lambda: steep_law_names(s.model))
+        return s.cache.get("steep laws", None, 1, lambda: steep_law_names(s.model))
 
     def _solver_workspace(self, nz: int, springy: np.ndarray) -> RadauStepWorkspace:
         """Return the new solver workspace of a run."""

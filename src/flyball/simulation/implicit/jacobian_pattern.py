@@ -59,7 +59,7 @@ class DependencePattern:
         self.entries = [S.column[S.row_start[k] : S.row_start[k + 1]] for k in range(self.nr + nm)]
         self.row = [self._velocities_of_bodies(np.unique(self.body[e])) for e in self.entries]
         states = s.nv + np.arange(nx)
-        self.told = np.r_[self._velocities_of_names(s, s.slots, nm), states]
+        self.law_columns = np.r_[self._velocities_of_names(s, s.slots, nm), states]
         self.bodies = [(c, np.unique(c)) for c in self.chain]
         self.all = [
             *self.bodies,
@@ -84,7 +84,7 @@ class DependencePattern:
 
     def _law(self, k: int, velocities: np.ndarray) -> np.ndarray:
         """Return these velocities with those that the laws of force k depend on."""
-        return np.union1d(velocities, self.told) if (self.S.forces.laws[k] >= 0).any() else velocities
+        return np.union1d(velocities, self.law_columns) if (self.S.forces.laws[k] >= 0).any() else velocities
 
     def _two_point_forces(self) -> list[Dependence]:
         out, forces = [], self.S.forces
@@ -292,7 +292,7 @@ def pressing_rows(S: System) -> np.ndarray:
 
 def jacobian_layout(s: Structure, S: System, index_3: bool = False) -> JacobianLayout:
     """Return the layout, cached for all runs of a structure."""
-    return s.kept.get("implicit", index_3, 2, lambda: JacobianLayout(s, S, index_3))
+    return s.cache.get("implicit", index_3, 2, lambda: JacobianLayout(s, S, index_3))
 
 
 def inverse_inertias(c: CompiledMechanism, t: float, y: np.ndarray) -> np.ndarray:

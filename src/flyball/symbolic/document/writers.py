@@ -30,7 +30,7 @@ def aligned_lines(formula: Formula, most: int) -> str:
     """A formula in LaTeX, in lines of about ``most`` letters."""
     printer = LatexPrinter()
     before = formula.left.latex if not formula.before else printer.products(formula.before)
-    after = printer.apart(formula.right) if formula.after else printer.expression(formula.right)
+    after = printer.delimited(formula.right) if formula.after else printer.expression(formula.right)
     if formula.after:
         more = printer.products(formula.after)
         after = more if formula.right == 0.0 else f"{after}{BREAK}{joined_terms(more)}"

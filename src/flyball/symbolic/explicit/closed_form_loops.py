@@ -383,11 +383,11 @@ class LoopSolver:
     def run(self) -> None:
         """Apply rules until none fits."""
         rules = (self._follow_known, self._one, self._linear_in_two, self._linear, self._combine_angles, self._pair)
-        self._plain()
+        self._remove_absent_unknowns()
         for _ in range(MAX_ROUNDS * len(self.unknowns)):
             if not any(rule() for rule in rules):
                 break
-            self._plain()
+            self._remove_absent_unknowns()
 
     def held(self, x: Node) -> list[Node]:
         """Unknowns that an equation depends on."""
@@ -399,7 +399,7 @@ class LoopSolver:
             self._changes[key] = depends_on(x, w, self.probe)
         return self._changes[key]
 
-    def _plain(self) -> None:
+    def _remove_absent_unknowns(self) -> None:
         """Remove unknowns from equations that do not depend on them."""
         for k, x in enumerate(self.equations):
             none = [w for w in self.unknowns if contains_symbol(x, w) and not self._depends(x, w)]

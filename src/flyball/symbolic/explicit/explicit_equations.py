@@ -172,7 +172,7 @@ class ExplicitEquations:
 
     # -- parts
 
-    def _told(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
+    def _as_expressions(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
         x = np.asarray(nodes, object)
         out = np.empty(x.shape, object)
         out.ravel()[:] = self.solution.inlined([self.equations.graph.node(y) for y in x.ravel()])
@@ -181,22 +181,22 @@ class ExplicitEquations:
     @property
     def M(self) -> Expressions:
         """Reduced mass matrix, along the independent velocities."""
-        return self._told(self.solution.M, self.independent, self.independent)
+        return self._as_expressions(self.solution.M, self.independent, self.independent)
 
     @property
     def f(self) -> Expressions:
         """Reduced forces, along the independent velocities."""
-        return self._told(self.solution.f, self.independent)
+        return self._as_expressions(self.solution.f, self.independent)
 
     @property
     def Z(self) -> Expressions:
         """Derivatives of the velocities by the independent ones: v = Z u' + terms of drivers."""
-        return self._told(self.solution.Z, self.solution.names, self.independent)
+        return self._as_expressions(self.solution.Z, self.solution.names, self.independent)
 
     @property
     def accelerations(self) -> Expressions:
         """Accelerations of the independent coordinates, in straight-line code (L D L^T)."""
-        return self._told(self.solution.accelerations[self.solution.chosen], self.independent)
+        return self._as_expressions(self.solution.accelerations[self.solution.chosen], self.independent)
 
     def formula(self, coordinate: str) -> Expressions:
         """Formula of a dependent coordinate; it may contain coordinates found before.
@@ -226,13 +226,13 @@ class ExplicitEquations:
         """
         for d in self.solution.formulas.implicit:
             if coordinate in d.names:
-                return self._told(d.residuals, d.names)
+                return self._as_expressions(d.residuals, d.names)
         raise ModelError(f"{coordinate!r} is not implicit; these are: {', '.join(self.implicit) or 'none'}")
 
     @property
     def determinants(self) -> dict[str, Expressions]:
         """Determinants by the coordinates they determine; where one vanishes, the partition is singular."""
-        return {k: self._told(x) for k, x in self.solution.determinants.items()}
+        return {k: self._as_expressions(x) for k, x in self.solution.determinants.items()}
 
     def __getitem__(self, name: str) -> Expressions:
         """A quantity of a result, in the independent coordinates, their rates, and implicit coordinates.
@@ -244,7 +244,7 @@ class ExplicitEquations:
         """
         found = self.equations[name]
         self._refuse_undetermined(name, found)
-        told = self._told(found.nodes, found.rows, found.columns)
+        told = self._as_expressions(found.nodes, found.rows, found.columns)
         return Expressions(self.equations, told.nodes, found.rows, found.columns, found.unit)
 
     def _unit(self, name: str) -> str:

@@ -360,7 +360,7 @@ class _Reduction:
         right = np.concatenate([G[:, chosen], c.nu[rows][:, None], c.gamma[rows][:, None]], axis=1)
         dets = Determinants()
         X = solve_blocks(Gw, right, dets, order)
-        self._told("constraints for", dets, [self.names[d] for d in dependent])
+        self._record_singular("constraints for", dets, [self.names[d] for d in dependent])
         n = len(chosen)
         Z, b = zero_objects(nv, n), zero_objects(nv)
         Z[chosen] = np.eye(n)
@@ -372,7 +372,7 @@ class _Reduction:
         f = product(Z.T, x.f - product(x.M, b))
         pivots = Determinants()
         a = solve_symmetric(M, f[:, None], pivots)[:, 0] if n else zero_objects(0)
-        self._told("inertia of", pivots, [self.names[d] for d in chosen])
+        self._record_singular("inertia of", pivots, [self.names[d] for d in chosen])
         vdot = product(Z, a) + b
         dets = Determinants()
         missing = (product(x.M, vdot) - x.f)[dependent]
@@ -411,6 +411,6 @@ class _Reduction:
         open_ = np.abs(y).max(axis=1, initial=0.0) > 1e-8
         return tuple(dict.fromkeys(e for e, yes in zip(self.place.c.elements, open_, strict=True) if yes))
 
-    def _told(self, what: str, dets: Determinants, names: Sequence[str]) -> None:
+    def _record_singular(self, what: str, dets: Determinants, names: Sequence[str]) -> None:
         for columns, value in dets.found:
             self.singular[f"{what} {', '.join(names[k] for k in columns)}"] = value

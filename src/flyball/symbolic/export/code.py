@@ -228,7 +228,7 @@ def _annotate_functions(eq: Equations, routines: Sequence[Routine]) -> None:
     """Record for Python functions which laws they belong to, for messages."""
     laws = {id(c.native.python): c.where for c in eq.named_equations.values.structure.functions}
     for _, f in python_functions_of(routines, Identifiers()).values():
-        f.told["of"] = laws.get(id(f.python), "")
+        f.details["of"] = laws.get(id(f.python), "")
 
 
 def _identifier(name: str, language: str) -> str:
