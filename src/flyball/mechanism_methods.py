@@ -1199,6 +1199,6 @@ class SymbolicMethods(Model):
         ImportError
             If CasADi is required and not installed.
         """
-        from .symbolic.export.export import ExportOptions, export
+        from .symbolic.derivation import ExportOptions, export
 
         return export(self, ExportOptions.from_arguments(locals()))
