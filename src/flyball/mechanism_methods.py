@@ -1140,7 +1140,7 @@ class SymbolicMethods(Model):
         Raises
         ------
         ModelError
-            If the mechanism has contacts, or a name does not exist.
+            If the mechanism has contacts or sampled controllers, or a name does not exist.
         """
         from .symbolic.derivation import symbolic
         from .symbolic.equations import SymbolicOptions
@@ -1199,6 +1199,6 @@ class SymbolicMethods(Model):
         ImportError
             If CasADi is required and not installed.
         """
-        from .symbolic.export.export import ExportOptions, export
+        from .symbolic.derivation import ExportOptions, export
 
         return export(self, ExportOptions.from_arguments(locals()))

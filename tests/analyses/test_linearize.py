@@ -10,6 +10,7 @@ from flyball.assembly.assemble import assemble
 from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
 from flyball.derivatives.reduced_equations import free_coordinates
 from flyball.errors import ModelError
+from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt
 
 LAYERS = ("absolute", "joint")
@@ -179,6 +180,23 @@ def test_a_driver_as_input(layer):
     assert got == pytest.approx([-0.5 * s * s / (s * s / 3 + G / 2), 1.0], rel=1e-9)
     with pytest.raises(fb.ModelError, match=r"'cart\.vx' follows the rate of input 'shaker'"):
         m.linearize(["shaker"], ["cart.vx"], coordinates=layer)
+
+
+def test_efforts_of_drivers_in_any_order():
+    """Each driver's effort is its own, whichever driver was added first; numeric and symbolic."""
+    found = []
+    for order in (1, -1):
+        m = fb.Mechanism("arm", planar=True, gravity=(0, -9.81))
+        m.add(*(fb.Body(name, mass=1, inertia=0.05, position=(x, 0)) for name, x in (("a", 0.5), ("b", 1.4), ("c", 2))))
+        m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
+        m.add(fb.Revolute("C", "b", "c", at=(1.8, 0)), fb.CoordinateSpring("s", "C.angle", stiffness=50, rest=0.04))
+        m.add(*[fb.Driver("move A", "A.angle", "0.2"), fb.Driver("move B", "B.angle", "0.1")][::order])
+        outputs, about = ["move A.effort", "move B.effort"], m.equilibrium()
+        N = m.linearize(outputs=outputs, about=about, coordinates="joint")
+        found += [N.C, linear_equations(m, outputs=outputs, at=about).values()["C"]]
+    for C in found[1:]:
+        assert pytest.approx(found[0], rel=1e-6) == C
+    assert abs(found[0][0, 0]) > 1.5 * abs(found[0][1, 0])  # about A the link has the longer arm
 
 
 @pytest.mark.parametrize("layer", LAYERS)

@@ -11,7 +11,7 @@ import pytest
 
 import flyball as fb
 from tests import mechanisms
-from tests.examples.test_examples import EQUATIONS
+from tests.examples.test_examples import PREPARED
 
 LAYERS = ["absolute", "joint"]
 G = 9.81
@@ -63,7 +63,7 @@ def somewhere(p) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-@pytest.mark.parametrize("name", EQUATIONS)
+@pytest.mark.parametrize("name", PREPARED)
 def test_the_equations_fit_together(name, layer):
     """M vdot = f + G^T lam + effort; G is the derivative of g; M is that of the bodies' kinetic energies."""
     m = mechanisms.example(name)

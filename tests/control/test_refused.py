@@ -127,7 +127,6 @@ def test_friction_of_a_negative_coefficient_in_a_single_run():
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
         lambda m: m.sensitivity(["A.displacement"], ["k"]),
-        lambda m: m.symbolic(),
         lambda m: m.simulate(1, method="variational", step=0.01),
         lambda m: m.simulate(1, method="impulse"),
     ],

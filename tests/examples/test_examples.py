@@ -31,9 +31,10 @@ EVENTS = {  # see test_events: what holds in them changes at instants, or may
     "ratchet.toml",
     "safety_brake.toml",
 }
-CONTROLLED = {"governor_pi.py"}  # states of controllers are no states of the mechanism; see test_governor_pi
-EQUATIONS = [name for name in FILES if name not in EVENTS | CONTROLLED]
+EQUATIONS = [name for name in FILES if name not in EVENTS]
 """Those with one set of equations for all times, friction by its direction."""
+PREPARED = [name for name in EQUATIONS if name != "governor_pi.py"]
+"""Those without controllers, whose states `prepare` does not support."""
 PROMISED = {
     "andrews.toml",
     "bricard.toml",

@@ -25,7 +25,7 @@ def random_state(m, coordinates, seed=3, spread=0.1):
     arrays = (np.array(x)[None] for x in (q, v, c.z, vdot, lam))
     q, v, z, vdot, lam = arrays
     result = Result(m.snapshot(), c.values, np.array([t]), q, v, z, vdot, lam, health=None)
-    values = eq.state(t, q[0], v[0])
+    values = eq.state(t, q[0], v[0], z[0])
     values |= dict(zip(eq.vdot.rows, vdot[0], strict=True)) | dict(zip(eq.lam.rows, lam[0], strict=True))
     places = {k: z[0, s.state_at[k]] for k in eq.places}
     values |= places

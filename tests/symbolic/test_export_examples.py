@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.examples.test_examples import EQUATIONS
+from tests.examples.test_examples import PREPARED
 from tests.symbolic.exported import example, given_at, states
 
 
-@pytest.mark.parametrize("name", EQUATIONS)
+@pytest.mark.parametrize("name", PREPARED)
 def test_accelerations_are_the_engines(name):
     m = example(name)
     eq, p = m.symbolic(coordinates="joint"), m.prepare(coordinates="joint")

@@ -18,7 +18,7 @@ from tests.examples.test_examples import EQUATIONS as EXAMPLES
 from tests.identities.test_complex_values import with_forces
 from tests.model.test_shapes import SAMPLES
 
-EQUATIONS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powers", "returned")
+EQUATIONS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "zdot", "returned")
 
 
 def agree(m):

@@ -164,7 +164,7 @@ def _computed_sizes(e: EquationDerivatives) -> StateSizes:
     moved = (abs(e.by_position[s].toarray()) * size).max(axis=1, initial=0.0)  # rates by large steps of the mechanism
     between = np.abs(e.state_jacobian)
     decay = np.diag(between)
-    usual = _usual_states(np.abs(e.state.z[: e.nz]), moved, between, np.where(decay > 0.0, decay, pace or 1.0))
+    usual = usual_states(np.abs(e.state.z[: e.nz]), moved, between, np.where(decay > 0.0, decay, pace or 1.0))
     energy = _energy_scale(e, float(among.max() if among.nnz else 0.0), usual) or inertia * pace**2 or 1.0
     forces = (np.abs(e.by_state[r]) * size[:, None]).max(axis=0, initial=0.0)  # per unit state
     change = np.where(forces > 0.0, energy / np.where(forces > 0.0, forces, 1.0), np.nan)
@@ -190,7 +190,7 @@ def _propagated_changes(change: np.ndarray, moved: np.ndarray, between: np.ndarr
     return change
 
 
-def _usual_states(z: np.ndarray, moved: np.ndarray, between: np.ndarray, decay: np.ndarray) -> np.ndarray:
+def usual_states(z: np.ndarray, moved: np.ndarray, between: np.ndarray, decay: np.ndarray) -> np.ndarray:
     """Magnitudes of the states, at least those to which large steps of the mechanism lead them, (nz,)."""
     followed = moved / decay
     for _ in range(len(z)):

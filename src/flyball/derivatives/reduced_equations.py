@@ -1,25 +1,13 @@
 """Linear equations of motion in free coordinates, with the constraints eliminated.
 
-The parts of this module, in order: minimum-norm solutions of redundant equations; free coordinates (bases of the
-motions that constraints allow, with identity rows for the chosen coordinates); bounds of the rounding errors of
-coefficients (Parlett and Reinsch 1969; Watkins 2006); the reduction itself.
-
-Let x be a change of position along the velocities, u a change of velocity, both seen from an evenly turning frame (see
-`steady_motion`), z a change of the controller states, w the inputs. The perturbed kinematics, equations of motion,
-constraints and controllers at a state are
-
-    x' + H x = u + N x,    M (u' + H u) + D u + K x + R z + r_w w = G^T l,
-    G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0,    z' = s_x x + s_u u + s_z z + s_w w
-
-K contains the change of forces, inertia and *reactions* when positions change. Joint forces turn with the bodies, so K
-is not only the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out
-of the equations along Zv. Joint friction depends on the reactions, adds F to -G^T, and needs another projection
-(``_multiplier_free_directions``). Inputs that move the mechanism act through their rates, too.
+`linear_reduction` has the equations. The parts of this module, in order: minimum-norm solutions of redundant equations;
+free coordinates (bases of the motions that constraints allow, with identity rows for the chosen coordinates); bounds of
+the rounding errors of coefficients (Parlett and Reinsch 1969; Watkins 2006); the reduction itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -34,6 +22,7 @@ from ..numerics.sparse_rank import sparse_matrix_rank as rank_of
 from ..tables.structure_definition import VelocityName, velocity_names
 from .equation_derivatives import EquationDerivatives, refuse_undetermined_friction
 from .force_balance import force_magnitudes, state_sizes
+from .linear_reduction import InputTerms, ReducedEquations, acting_terms, constrained_changes
 
 DENSE_UNKNOWNS = 400  # up to so many unknowns the solution uses singular values
 SINGULAR_VALUE_LIMIT = 1e-11  # singular values below this part of the largest count as zero
@@ -136,10 +125,21 @@ class FreeCoordinates:
         A = self.rows if rows is None else rows
         return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=RANK_TOLERANCE)[0]
 
-    @staticmethod
-    def without_chosen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """Add motions of the basis to x so that no chosen coordinate changes."""
-        return x - basis @ (left @ x)
+    def dependent_positions(self, right: np.ndarray) -> np.ndarray:
+        """See `FreeMotions`."""
+        x = -self.solve(right, self.holonomic)
+        return x - self.Z @ (self.position_selector @ x)
+
+    def dependent_velocities(self, right: np.ndarray) -> np.ndarray:
+        """See `FreeMotions`."""
+        if not right.any():
+            return np.zeros((len(self.scale), right.shape[1]))
+        u = -self.solve(right)
+        return u - self.Zv @ (self.velocity_selector @ u)
+
+    def coordinates(self, x: np.ndarray) -> np.ndarray:
+        """See `FreeMotions`."""
+        return self.position_selector @ x
 
 
 def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None) -> FreeCoordinates:
@@ -262,8 +262,9 @@ def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None
         a *= NEARBY_STEP / np.abs(a / f.scale).max()
         G = _nearby_jacobian(c, x.t, x.q, a, f.scale)
         if G is not None and constraint_rank(G, f.scale) > here:
-            names = _dependent_elements(f, G, c)
-            raise singular_position_error(x.t, names)
+            of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
+            now, there = (normalised_rows(rows, f.scale) for rows in (f.holonomic, G))
+            raise singular_position_error(x.t, lost_constraints(now, there, of))
 
 
 def singular_position_error(t: float, names: tuple[str, ...]) -> SingularityError:
@@ -303,15 +304,14 @@ def _nearby_jacobian(
         c.z = z
 
 
-def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism) -> tuple[str, ...]:
-    """Elements whose rows take part in dependencies that nearby positions do not have."""
-    here, there = (
-        fundamental_subspaces(normalised_rows(f.holonomic, f.scale)).dependencies,
-        fundamental_subspaces(normalised_rows(G, f.scale)).span,
-    )
-    part = np.abs(here @ (here.T @ there)).max(axis=1)
-    of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
-    return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))
+PARTICIPATION = 1e-3  # elements whose part in a dependency is smaller do not take part in it
+
+
+def lost_constraints(here: np.ndarray, there: np.ndarray, elements: Sequence[str]) -> tuple[str, ...]:
+    """Elements whose normalised rows take part in dependencies that nearby positions do not have."""
+    lost, span = fundamental_subspaces(here).dependencies, fundamental_subspaces(there).span
+    part = np.abs(lost @ (lost.T @ span)).max(axis=1)
+    return tuple(dict.fromkeys(name for name, x in zip(elements, part, strict=True) if x > PARTICIPATION))
 
 
 def static_equations(e: EquationDerivatives) -> EquationDerivatives:
@@ -469,65 +469,6 @@ class TurningFrame:
     description: str = ""
 
 
-@dataclass
-class InputTerms:
-    """Derivatives of the equations by m inputs at a fixed state.
-
-    r_w (nv, m), g_w (holonomic, m), n_w (rows, m), s_w (nz, m).
-    """
-
-    r: np.ndarray
-    g: np.ndarray
-    n: np.ndarray
-    s: np.ndarray
-
-
-@dataclass
-class ReducedEquations:
-    """Linear equations in the changes y = (a, b, z) of free coordinates, velocities and controller states, and inputs.
-
-    The columns of every array belong to y (n), the inputs, and their first and second rates (m each).
-
-    Attributes
-    ----------
-    rate : ndarray (n, n + 3 m)
-        y' as a linear function of y and the inputs.
-    position, velocity, acceleration, multipliers, states : ndarray
-        Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates, and
-        controller states.
-    laws : ndarray (nz, n + 3 m)
-        Changes of the rates of the controller states; for sampled ones of the values from the next instant on.
-    changes : ndarray (nz,)
-        Large changes of the controller states.
-    M, D, K : ndarray (f, f) or None
-        Matrices of M a'' + D a' + K a = 0; None unless all constraints are on positions and there are no states z.
-    uncertainty : MatrixUncertainty
-        Uncertainty of A due to rounding.
-    """
-
-    rate: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    multipliers: np.ndarray
-    states: np.ndarray
-    laws: np.ndarray
-    changes: np.ndarray
-    M: np.ndarray | None = None
-    D: np.ndarray | None = None
-    K: np.ndarray | None = None
-    uncertainty: MatrixUncertainty | None = None
-
-    @property
-    def A(self) -> np.ndarray:
-        """System matrix, s' = A s without inputs."""
-        return self.rate[:, : len(self.rate)]
-
-    def inputs(self, part: np.ndarray) -> list[np.ndarray]:
-        """Columns of the inputs, of their first rates and of their second rates."""
-        return np.split(part[:, len(self.rate) :], 3, axis=1)
-
-
 def reduced_equations(
     e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame, w: InputTerms | None = None
 ) -> ReducedEquations:
@@ -538,74 +479,40 @@ def reduced_equations(
     ModelError
         If a free motion has no inertia.
     """
-    r, nv, free = e.at["r"], len(f.scale), f.Z.shape[1] + f.Zv.shape[1] + e.nz
+    r, s, nv = e.at["r"], e.at["s"], len(f.scale)
     M, D, K = (X[r].toarray() for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    H, N = frame.H, frame.N
+    S, T, Z = e.by_position[s].toarray(), e.by_velocity[s].toarray(), e.by_state[s]
+    H, turning = frame.H, frame.N - frame.H
     w = w or InputTerms(*(np.zeros((n, 0)) for n in (nv, len(f.holonomic), len(f.rows), e.nz)))
-    none = np.zeros_like(w.r)
-    x, u, P, by_inputs = _constrained_motions(e, f, w)
-    a_dot = f.position_selector @ (u + (N - H) @ x)
-    known = P @ a_dot + np.hstack([np.zeros((nv, free)), none, *by_inputs])
-    acting = np.hstack([np.zeros((nv, free - e.nz)), e.by_state[r], w.r, none, none])
-    others = (M @ H + D) @ u + K @ x + acting
+    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((len(f.rows) - e.block("n").size, nv))])
+    c = constrained_changes(f, w, V, turning)
+    others = acting_terms(c, M @ H + D, K, e.by_state[r], w.r)
+    laws = acting_terms(c, T, S, Z, w.s)
     by_multipliers = -f.rows.T
     Y = f.Zv
     if e.state.c.structure.loads:
         by_multipliers[:, : e.block("n").size] += e.by_reactions
         Y = _multiplier_free_directions(e, f)
-    size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
-    size[:, free - e.nz : free] += abs(e.by_state[r])
-    z, laws, law_terms = _controller_equations(e, x, u, w)
-    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.position_selector) @ (abs(u) + abs(N - H) @ abs(x)), size, law_terms, Y, M)
-    forces, rates = Y.T @ (M @ known + others), np.where(e.sampled[:, None], 0.0, laws)
+    size = abs(M @ H) @ abs(c.u) + abs(D) @ abs(c.u) + abs(K) @ abs(c.x) + abs(M) @ abs(c.known)
+    size += abs(e.by_state[r]) @ abs(c.z)
+    law_terms = abs(S) @ abs(c.x) + abs(T) @ abs(c.u) + abs(Z) @ abs(c.z)
+    terms = TermSizes(
+        Y.T @ M @ f.Zv, abs(f.position_selector) @ (abs(c.u) + abs(turning) @ abs(c.x)), size, law_terms, Y, M
+    )
+    forces, rates = Y.T @ (M @ c.known + others), np.where(e.sampled[:, None], 0.0, laws)
     try:
-        doubt = remove_rounding(terms, a_dot, forces, rates, e, f)
+        doubt = remove_rounding(terms, c.a_dot, forces, rates, e, f)
     except np.linalg.LinAlgError:
         d = f.chosen_v[int(np.argmin(np.abs(np.diag(terms.mass))))]
         raise massless_motion_error(f.names[d].name) from None
-    b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else a_dot[:0]
-    acceleration = f.Zv @ b_dot + known + H @ u
-    left = M @ (acceleration - H @ u) + others
+    b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else c.a_dot[:0]
+    acceleration = f.Zv @ b_dot + c.known + H @ c.u
+    left = M @ (acceleration - H @ c.u) + others
     multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
-    rate, changes = np.vstack([a_dot, b_dot, rates]), state_sizes(e).change if e.nz else np.zeros(0)
-    out = ReducedEquations(rate, x, u, acceleration, multipliers, z, laws, changes, uncertainty=doubt)
-    if f.Zv.shape == f.Z.shape and not e.nz:
-        turned = (H - N) @ f.Z  # u = Z a' + turned a
-        out.M = terms.mass
-        out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
-        out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
+    rate, changes = np.vstack([c.a_dot, b_dot, rates]), state_sizes(e).change if e.nz else np.zeros(0)
+    out = ReducedEquations(rate, c.x, c.u, acceleration, multipliers, c.z, laws, changes, uncertainty=doubt)
+    out.add_second_order(f, Y, terms.mass, (M, M @ H + D, K), turning)
     return out
-
-
-def _constrained_motions(
-    e: EquationDerivatives, f: FreeCoordinates, w: InputTerms
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Changes x and u that keep the constraints, P, and (U, U1); see the module."""
-    nv, given = len(f.scale), len(f.rows) - e.block("n").size
-    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((given, nv))])
-    none, states = np.zeros_like(w.r), np.zeros((nv, e.nz))
-    rates = np.zeros((len(f.rows), w.g.shape[1]))
-    rates[f.on_positions] = w.g
-    X = f.without_chosen(-f.solve(w.g, f.holonomic), f.Z, f.position_selector)
-    P, U, U1 = (
-        f.without_chosen(-f.solve(b), f.Zv, f.velocity_selector) if b.any() else np.zeros((nv, b.shape[1]))
-        for b in (V @ f.Z, V @ X + w.n, rates)
-    )
-    x = np.hstack([f.Z, np.zeros_like(f.Zv), states, X, none, none])
-    return x, np.hstack([P, f.Zv, states, U, U1, none]), P, (U, U1)
-
-
-def _controller_equations(
-    e: EquationDerivatives, x: np.ndarray, u: np.ndarray, w: InputTerms
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Changes of the controller states, of their laws, and magnitudes of the terms of these."""
-    s, m = e.at["s"], w.s.shape[1]
-    z = np.zeros((e.nz, x.shape[1]))
-    z[:, x.shape[1] - 3 * m - e.nz : x.shape[1] - 3 * m] = np.eye(e.nz)
-    S, T, Z = e.by_position[s].toarray(), e.by_velocity[s].toarray(), e.by_state[s]
-    laws = S @ x + T @ u + Z @ z
-    laws[:, x.shape[1] - 3 * m : x.shape[1] - 2 * m] += w.s
-    return z, laws, abs(S) @ abs(x) + abs(T) @ abs(u) + abs(Z) @ z
 
 
 def massless_motion_error(name: str) -> ModelError:

@@ -10,7 +10,7 @@ expressions. Loads of joints with friction are separate symbols; `TracedEquation
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,14 +20,15 @@ from ..engine.element_dispatch import row_biases, row_values
 from ..engine.entry_point import allocate_work
 from ..engine.kinematics import coordinate_rates, update_motions, update_poses
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches, reaction_loads
-from ..engine.rows import count_measured
+from ..engine.rows import count_measured, update_controllers
+from ..laws.bytecode import BY_TIME, evaluate_jet
 from ..model.expressions import is_number_text
 from ..model.model import Model
 from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import LOAD, NUMBERS, PLANAR, RETURNED, VALUE, System, Work, named_arrays, with_numbers
 from ..tables.values import values
-from .graph import Graph, Node, Symbol
+from .graph import Graph, Node, Symbol, object_vector
 
 TRACED_TABLES = tuple(name for name in NUMBERS if name != "switch_numbers")
 """Number tables of `System` that equations of motion without switches use."""
@@ -49,7 +50,7 @@ class TracedEquations:
     t: Node
     q: list[Node]
     v: list[Node]
-    z: list[Node]  # turn counters, curve parameters, works
+    z: list[Node]  # controller states, turn counters, curve parameters, works
     lam: list[Node]
     loads: list[Node]  # of joints with friction
     T: np.ndarray  # (nq, nv)
@@ -61,8 +62,18 @@ class TracedEquations:
     gamma: np.ndarray  # (nr,)
     measured: np.ndarray  # (nm, 3): value, rate and bias of every measured quantity
     gradients: np.ndarray  # (nm, nv): gradients of these
-    powers: np.ndarray  # rates of the works, in the order of ``z``; 0 elsewhere
+    zdot: np.ndarray  # rates of the controller states and works, in the order of ``z``; 0 elsewhere
     returned: np.ndarray  # (nl,): loads that follow from the multipliers
+
+    @property
+    def states(self) -> list[Node]:
+        """Symbols of the controller states, the first of z."""
+        return self.z[: len(self.structure.controls)]
+
+    @property
+    def state_rates(self) -> np.ndarray:
+        """Rates of the controller states."""
+        return self.zdot[: len(self.structure.controls)]
 
 
 def object_tables(S: System) -> System:
@@ -98,7 +109,7 @@ def trace_equations(
     W = allocate_work(s, S, dtype=object)
     t = graph.symbol(Symbol("t", "time", "t", "s"))
     q, v, z, lam, loads = ([graph.symbol(x) for x in names_] for names_ in names)
-    work_rates = np.zeros(len(z), object)
+    zdot = np.zeros(len(z), object)
     nv = s.nv
     own = [x - at for x, at in zip(q, reference, strict=True)] if len(reference) else q
     _kinematics(S, W, t, own, v, z)
@@ -109,18 +120,46 @@ def trace_equations(
     _rates(S, q, v, T)
     f = W.velocities.applied
     inertial_wrenches(S, W)
-    apply_forces(S, W, t, work_rates)
+    update_controllers(S, W, t, z, zdot)
+    apply_forces(S, W, t, zdot)
     gather_forces(S, W, f)
-    apply_efforts(S, W, t, work_rates, f)
+    apply_efforts(S, W, t, zdot, f)
     M = mass_matrix(S, W, nv)
     gradients, G = _rows(S, W, nm, nv)
     W.rows.multiplier[:] = lam
     reaction_loads(S, W)
     return TracedEquations(
         graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.rows.value.copy(), W.rows.nu.copy(), G,
-        W.rows.gamma.copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, work_rates,
-        W.sensed[RETURNED, 2 * nm :].copy(),
+        W.rows.gamma.copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, zdot,
+        W.sensed[RETURNED, 2 * nm : 2 * nm + len(loads)].copy(),
     )  # fmt: skip
+
+
+def with_prescribed_rows(x: TracedEquations, lam: list[Node], reference: Sequence[Any] = ()) -> TracedEquations:
+    """The equations with coordinates that drivers prescribe as further rows, q = f(t), in the order of results.
+
+    Parameters
+    ----------
+    x : TracedEquations
+    lam : list of Node
+        Symbols of all multipliers; those of the further rows are efforts.
+    reference : sequence, optional
+        As for `trace_equations`.
+    """
+    s, S = x.structure, x.system
+    g, nu, gamma, G, zdot = [], [], [], np.zeros((len(s.prescribed), s.nv), object), x.zdot.copy()
+    for k, b in enumerate(s.prescribed.values()):
+        f = evaluate_jet(S.code, S.const, S.tree.law[b], x.work.stack, x.t, x.work.sensed, BY_TIME)
+        q, v = S.tree.q[b], S.tree.v[b]
+        g.append(x.q[q] - (f[0] - (S.bodies.offset[b] - (reference[q] if len(reference) else 0.0))))
+        nu.append(f[1])
+        gamma.append(f[2])
+        G[k] = 0.0
+        G[k, v] = 1.0
+        if S.tree.work[b] >= 0:
+            zdot[S.tree.work[b]] = lam[len(s.rows) + k] * x.v[v]
+    rows = {"g": np.r_[x.g, object_vector(g)], "nu": np.r_[x.nu, object_vector(nu)], "G": np.vstack([x.G, G])}
+    return replace(x, lam=lam, gamma=np.r_[x.gamma, object_vector(gamma)], zdot=zdot, **rows)
 
 
 def tables_by_name(s: Structure, S: System) -> dict[int, str]:

@@ -26,6 +26,7 @@ from ..derivatives.nonsmooth_points import nonsmooth_error, nonsmooth_points
 from ..derivatives.output_derivatives import curve_derivatives, curve_gradients, refuse_undetermined_outputs_sparse
 from ..derivatives.reduced_equations import NEARBY_STEP as AWAY
 from ..derivatives.reduced_equations import (
+    PARTICIPATION,
     FreeCoordinates,
     TurningFrame,
     massless_motion_error,
@@ -80,8 +81,6 @@ def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.n
 
 DENSE_VELOCITIES = 600
 DENSE_FREEDOMS = 150  # velocities minus constraint rows
-# Elements whose part in a dependency is smaller do not take part in it.
-PARTICIPATION = 1e-3
 # Dependencies of unit rows that change by more than this at a nearby position do not exist there.
 LOST_DEPENDENCY = 1e-6
 # A response this large, with every inertia scaled to one, shows a motion without inertia.

@@ -1,8 +1,7 @@
 """Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
 
-With inputs w the reduced equations (see `reduced_equations`) read x' = A x + B0 w + B1 w' + B2 w''. Inputs
-that move the mechanism (drivers, lengths) also act through their rates, because the constraints hold for positions,
-velocities and accelerations. The change of state x~ = x - B2 w' - (B1 + A B2) w eliminates the rates of w.
+With inputs that move the mechanism (drivers, lengths) the reduced equations (see `linear_reduction`) contain rates of
+inputs, which a change of state eliminates.
 """
 
 from __future__ import annotations
@@ -18,13 +17,12 @@ from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
 from ..derivatives.force_balance import state_sizes
+from ..derivatives.linear_reduction import InputTerms, ReducedEquations, state_names
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.reduced_equations import (
     FreeCoordinates,
-    InputTerms,
     MatrixUncertainty,
-    ReducedEquations,
     TurningFrame,
     free_coordinates,
     reduced_equations,
@@ -60,8 +58,6 @@ from .sampling_cycle import SampledSignal, cycle_equations, refuse_unsettled
 # For `refuse_switching_with_controllers`.
 SMALL_MOTIONS, JOINTS_INSTEAD = "small motions know", "put joints in its place"
 FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts as none
-# Dependence of an output on an input's rate below this part of its total dependence on the input is rounding.
-IMPROPER = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,20 +291,14 @@ def _output_matrix(
 
 def _matrices(r: ReducedEquations, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
     """A, B, C, D for the state in which the rates of inputs are eliminated."""
-    A, n = r.A, len(r.rate)
-    B, B1, B2 = r.inputs(r.rate)
-    C, (D, D1, D2) = y[:, :n], r.inputs(y)
-    shift = B1 + A @ B2
-    known = np.abs(D) + np.abs(D1) + np.abs(D2) + np.abs(C) @ (np.abs(B) + np.abs(B1) + np.abs(B2))
-    for rate, part in (("rate", D1 + C @ B2), ("second rate", D2)):
-        bad = np.argwhere(np.abs(part) > IMPROPER * known)
-        if len(bad):
-            k, i = bad[0]
-            raise ModelError(
-                f"output {outputs[k]!r} follows the {rate} of input {inputs[i].name!r}, which no state-space model "
-                f"can; leave out one of the two"
-            )
-    return [A, B + A @ shift, C, D + C @ shift]
+    matrices, improper = r.state_space(y)
+    if improper:
+        k, i, rate = improper
+        raise ModelError(
+            f"output {outputs[k]!r} follows the {rate} of input {inputs[i].name!r}, which no state-space model "
+            f"can; leave out one of the two"
+        )
+    return matrices
 
 
 def _sorted(w: np.ndarray) -> np.ndarray:
@@ -324,16 +314,14 @@ def _state_space(
     e: EquationDerivatives, f: FreeCoordinates, r: ReducedEquations, inputs: list[Input], outputs: Sequence[str]
 ) -> StateSpace:
     A, B, C, D = _matrices(r, _output_matrix(e, r, inputs, outputs), inputs, outputs)
-    named = [f.names[d] for d in f.chosen]
-    rates = [f.names[d] for d in f.chosen_v]
-    controls = [x.name for x in e.state.c.structure.controls]
+    states, units = state_names(f.names, f, [x.name for x in e.state.c.structure.controls])
     return StateSpace(
         A=A,
         B=B,
         C=C,
         D=D,
-        states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates), *controls),
-        state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates), *("" for _ in controls)),
+        states=states,
+        state_units=units,
         mass=r.M,
         damping=r.D,
         stiffness=r.K,

@@ -65,7 +65,7 @@ class SymbolicOptions(Options):
 class EquationSymbols(SymbolTable):
     """Equations of motion of a mechanism in one kind of coordinates, in its own names.
 
-    qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
+    qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma,   zdot of the controller states z
     """
 
     def __init__(
@@ -154,6 +154,16 @@ class EquationSymbols(SymbolTable):
         return self._symbols(self.named_equations.vdot)
 
     @property
+    def z(self) -> Expressions:
+        """Controller states, (nz,)."""
+        return self._symbols(self.named_equations.traced.states)
+
+    @property
+    def zdot(self) -> Expressions:
+        """Rates of the controller states, (nz,)."""
+        return Expressions(self, self.named_equations.traced.state_rates, self.z.rows)
+
+    @property
     def lam(self) -> Expressions:
         """Multipliers, (nr,)."""
         return self._symbols(self.named_equations.traced.lam)
@@ -230,9 +240,9 @@ class EquationSymbols(SymbolTable):
             If the mechanism cannot be assembled.
         """
         a = self.assembly
-        return self.state(a.t, a.q, a.v)
+        return self.state(a.t, a.q, a.v, a.compiled.z.real)
 
-    def state(self, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
+    def state(self, t: float, q: np.ndarray, v: np.ndarray, z: Sequence[float] | np.ndarray = ()) -> dict[str, Any]:
         """Arrays of the engine as values by symbol names; arrays over time have the time last.
 
         Parameters
@@ -240,8 +250,10 @@ class EquationSymbols(SymbolTable):
         t : float
         q : ndarray (nq,)
         v : ndarray (nv,)
+        z : ndarray
+            Controller states, the first of the engine's states.
         """
-        return state_by_symbol(self.named_equations, t, q, v)
+        return state_by_symbol(self.named_equations, t, q, v, z)
 
     def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, Any]:
         """Check values of symbols by name, and find the curve parameters."""
@@ -252,8 +264,8 @@ class EquationSymbols(SymbolTable):
         return super().checked(known, requested)
 
     def evaluate(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
-        return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
+        """M, f, g, nu, G, gamma, T and zdot at values of the symbols; see `Expressions.at`."""
+        return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma", "zdot")}
 
 
 class Quantities:
@@ -353,7 +365,9 @@ class EquationDisplay:
     def _written_out(self) -> int:
         """Number of symbols of the equations without names for common subexpressions."""
         eq = cast("Equations", self)
-        return expanded_symbol_count(x for k in ("M", "f", "g", "G", "gamma") for x in getattr(eq, k).nodes.ravel())
+        return expanded_symbol_count(
+            x for k in ("M", "f", "g", "G", "gamma", "zdot") for x in getattr(eq, k).nodes.ravel()
+        )
 
     def _too_large(self, what: str) -> str:
         eq = cast("Equations", self)
@@ -404,6 +418,7 @@ class EquationDisplay:
             ("coordinates", eq.coordinates),
             ("q", ", ".join(eq.q.rows)),
             ("v", ", ".join(eq.v.rows)),
+            ("z", ", ".join(eq.z.rows)),
             ("lam", ", ".join(eq.lam.rows) or "none: no constraints"),
             ("loads", ", ".join(eq.loads.rows)),
             ("places", ", ".join(eq.places)),
@@ -416,8 +431,8 @@ class EquationDisplay:
     def as_dict(self) -> dict[str, Any]:
         """Plain data: names, parameters, and the matrices as texts."""
         eq = cast("Equations", self)
-        names = {k: list(getattr(eq, k).rows) for k in ("q", "v", "lam", "loads")}
-        texts = {k: getattr(eq, k).texts() for k in ("M", "f", "g", "nu", "G", "gamma")}
+        names = {k: list(getattr(eq, k).rows) for k in ("q", "v", "z", "lam", "loads")}
+        texts = {k: getattr(eq, k).texts() for k in ("M", "f", "g", "nu", "G", "gamma", "zdot")}
         told = {"name": eq.model.name, "coordinates": eq.coordinates, "inputs": list(eq.inputs)}
         return told | names | {"parameters": eq.parameters} | texts
 
@@ -467,7 +482,8 @@ class Linearization:
         independent : sequence of str
             Coordinates whose changes are the states; chosen by pivoting if not given.
         balanced_by : sequence of str
-            Parameters that are solved for so that the point is an equilibrium, as many as there are conditions.
+            Parameters and controller states that are solved for so that the point is an equilibrium, as many as there
+            are conditions.
 
         Raises
         ------
@@ -512,7 +528,7 @@ def _rate(name: Any) -> Any:
 class Equations(EquationDisplay, Linearization, EquationSymbols):
     """Equations of motion of a mechanism in one kind of coordinates.
 
-        qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
+        qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma,   zdot of the controller states z
 
     Symbols have the names used in results: ``"A.angle"``, its rate ``"A.angle'"``, parameters by their names. All are
     `Expressions`: ``eq.M[0, 0]``, ``eq.f.sympy()``, ``eq.g.at({"A.angle": 0.3})``. Every quantity of a result is
@@ -526,6 +542,8 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
     q, v, vdot : Expressions
         The symbols of coordinates, velocities and accelerations. A body that is free in space has the Euler parameters
         ``e0`` to ``e3`` in q, and in v the angular velocity ``w_x``, ``w_y``, ``w_z`` along its own axes.
+    z, zdot : Expressions
+        The symbols of controller states, ``"pid.integral"``, and their rates.
     lam : Expressions
         The symbols of the multipliers, one for each row of g; of a driver or a coupling its effort.
     loads : Expressions

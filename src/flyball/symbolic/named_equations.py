@@ -25,16 +25,16 @@ from ..constraints.curve import point
 from ..constraints.registry import Kind
 from ..engine.kinematics import load_record, twist_column
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
-from ..engine.rows import BY_TIME, row_parameters
+from ..engine.rows import row_parameters
 from ..errors import ModelError
 from ..expression_graph.evaluation import evaluate, nodes_in_order
 from ..expression_graph.graph import ADD, MULTIPLY, NUMBER, Graph, Node, Symbol, object_vector
-from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations
-from ..laws.bytecode import evaluate_jet
+from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations, with_prescribed_rows
 from ..math.scalar import atan2
 from ..math.spline import BREAKS
 from ..math.vec import mtv, sub
 from ..model.body import Body, Driver, Frame
+from ..model.controller_signals import ConnectedState
 from ..model.element import Element
 from ..model.joint import Joint
 from ..tables.forest import coordinate_row
@@ -64,7 +64,7 @@ def mechanism_symbols(x: Values) -> MechanismSymbols:
     q = _coordinates(s, v)
     rates = [_rate(p) if p.kind == "coordinate" else p for p in v]
     seconds = [_second(p) if p.kind == "coordinate" else _rate(p, "acceleration") for p in v]
-    states = [_state(name) for name in s.states]
+    states = [_controller_state(c) for c in s.controls] + [_state(name) for name in s.states[len(s.controls) :]]
     loads = [Symbol(f"{e.name}.load", "load", rf"P_{{{latex_part_name(e.name)}}}", "N", e.name) for e in s.loads]
     return MechanismSymbols(q, rates, seconds, states, _multipliers(s), loads)
 
@@ -124,6 +124,11 @@ def _dotted(dot: str, latex: str) -> str:
     return f"{dot}{{{letter}}}" + (f"_{rest}" if rest else "")
 
 
+def _controller_state(x: ConnectedState) -> Symbol:
+    index = latex_part_name(x.controller.name)
+    return Symbol(x.name, "state", rf"\mathrm{{{latex_part_name(x.state)}}}_{{{index}}}", "", x.controller.name)
+
+
 def _state(name: str) -> Symbol:
     owner, _, what = name.rpartition(".")
     latex = {"place": "s", "work": "W"}.get(what, rf"\mathrm{{{what}}}")
@@ -142,8 +147,7 @@ def _multipliers(s: Structure) -> list[Symbol]:
     names = [_row_name(row.element, row.label) for row in s.rows]
     names = list(numbered_names(names))
     out = [_multiplier(s, name, row.element) for name, row in zip(names, s.rows, strict=True)]
-    later = sorted(s.prescribed, key=lambda k: s.slices[k].start)
-    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in later]
+    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in s.prescribed]
 
 
 def _row_name(e: Element, label: str) -> str:
@@ -366,12 +370,12 @@ def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
     new = [(foot, place.symbol) for foot, place in zip(feet, places, strict=True)]
     cleaned = _cleaner(x, T, own_q, more, new)
     lam = [*T.lam, *(graph.symbol(e) for e in names.lam[nr:])]
-    T = _cleaned_arrays(_prescribed(T, S, lam), cleaned)
+    T = _cleaned_arrays(with_prescribed_rows(T, lam, drawn), cleaned)
     places = [
         replace(p, equation=_cleaned_entry(cleaned, p.equation), rate=_cleaned_entry(cleaned, p.rate)) for p in places
     ]
     vdot = [graph.symbol(a) for a in names.vdot]
-    named = {n.data.name: n for n in (T.t, *T.q, *T.v, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
+    named = {n.data.name: n for n in (T.t, *T.q, *T.v, *T.states, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
     return NamedEquations(x, T, own_q, drawn, vdot, places, cleaned, named)
 
 
@@ -409,7 +413,7 @@ def _cleaner(
     s, unknown = x.structure, []
     owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
     for name, at in s.state_at.items():
-        if name.endswith((".work", ".place")):
+        if at < len(s.controls) or name.endswith((".work", ".place")):
             continue
         t = owners.get(name)
         found = None if t is None else angles.of(t.owner, t.what, t.F, t.M)
@@ -427,32 +431,7 @@ def _cleaner(
     return TurnElimination(T.graph, new, unknown)
 
 
-def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
-    """Coordinates that drivers prescribe as constraints q = f(t), with the effort as multiplier."""
-    s = T.structure
-    order = sorted(s.prescribed, key=lambda k: s.slices[k].start)
-    g, nu, G, gamma = [], [], np.zeros((len(order), s.nv), object), []
-    for k, name in enumerate(order):
-        b = s.prescribed[name]
-        f = evaluate_jet(S.code, S.const, S.tree.law[b], T.work.stack, T.t, T.work.sensed, BY_TIME)
-        g.append(T.q[S.tree.q[b]] - f[0])
-        nu.append(f[1])
-        gamma.append(f[2])
-        G[k] = 0.0
-        G[k, S.tree.v[b]] = 1.0
-        if S.tree.work[b] >= 0:
-            T.powers[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
-    return replace(
-        T,
-        lam=lam,
-        g=np.r_[T.g, object_vector(g)],
-        nu=np.r_[T.nu, object_vector(nu)],
-        G=np.vstack([T.G, G]),
-        gamma=np.r_[T.gamma, object_vector(gamma)],
-    )
-
-
-ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powers", "returned")
+ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "zdot", "returned")
 
 
 def _cleaned_arrays(T: TracedEquations, cleaned: TurnElimination) -> TracedEquations:
@@ -478,13 +457,16 @@ def quaternions(x: NamedEquations) -> list[list[Node]]:
 CURVE_SAMPLES = 20  # initial samples of a curve between two breaks
 
 
-def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
+def state_by_symbol(
+    x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray, z: Sequence[float] | np.ndarray
+) -> dict[str, Any]:
     """Arrays of the engine as values by symbol names."""
     T = x.traced
     out: dict[str, Any] = {T.t.data.name: t}
     for symbol, drawn, value in zip(T.q, x.reference_values, q, strict=True):
         out[symbol.data.name] = _python_number(value + drawn.real)
-    return out | {symbol.data.name: _python_number(value) for symbol, value in zip(T.v, v, strict=True)}
+    others = (*zip(T.v, v, strict=True), *zip(T.states, z, strict=False))
+    return out | {symbol.data.name: _python_number(value) for symbol, value in others}
 
 
 def _python_number(x: Any) -> Any:

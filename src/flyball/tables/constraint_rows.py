@@ -207,7 +207,8 @@ def sort_terms(s: Structure) -> None:
     angles = integer_table(Angles, s.angles)
     s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}
     s.tables["angles"] = Angles(new[angles.F], new[angles.M], angles.state)
-    for k, name in enumerate(sorted(s.prescribed, key=s.prescribed.__getitem__)):
+    s.prescribed = dict(sorted(s.prescribed.items(), key=lambda x: x[1]))
+    for k, name in enumerate(s.prescribed):
         s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
     s.tables["frame_body"] = np.array([f.body for f in s.frames], np.int64)
     s.tables["rows"] = integer_table(Rows, [(r.law, r.wrap, r.work) for r in s.rows])

@@ -79,7 +79,7 @@ class Structure:
     place: dict[str, int] = field(default_factory=dict)  # body name -> row of the body table
     tree_joints: dict[str, TreeJoint] = field(default_factory=dict)
     points: frozenset[str] = frozenset()  # bodies that are point masses
-    prescribed: dict[str, int] = field(default_factory=dict)  # driver -> row of the body table it prescribes
+    prescribed: dict[str, int] = field(default_factory=dict)  # driver -> row of the body table, in this order
     frames: list[FrameSpec] = field(default_factory=list)
     frame_at: dict[tuple[str, str, str], int] = field(default_factory=dict)  # (element, role, coordinate) -> frame
     terms: list[TermSpec] = field(default_factory=list)

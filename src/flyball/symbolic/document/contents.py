@@ -226,6 +226,14 @@ def equations_of_motion(eq: Equations, acting: Section) -> Section:
     return Section("motion", "Equations of motion", out)
 
 
+def controllers(eq: Equations) -> list[Section]:
+    """Rates of the states of controllers."""
+    T = eq.named_equations.traced
+    rates = zip(T.states, T.state_rates, strict=True)
+    rows = [Formula(Tex(rf"\frac{{d}}{{dt}} {latex_symbol(x.data)}", f"{x.data.name}'"), y) for x, y in rates]
+    return [Section("controllers", "Controllers", [Formulas("", rows)])] if rows else []
+
+
 def energies(eq: Equations) -> Section:
     """Kinetic and potential energy."""
     rows = [

@@ -106,6 +106,7 @@ def document(eq: Equations) -> Document:
         contents.mass_matrix(eq),
         acting := contents.forces(eq),
         contents.equations_of_motion(eq, acting),
+        *contents.controllers(eq),
         contents.energies(eq),
     ]
     made = Document(eq.model.name, size_description(eq), sections)

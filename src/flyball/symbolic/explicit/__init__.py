@@ -5,7 +5,8 @@ kinematic loops in closed form, `definitions` holds formulas or the equations fo
 eliminates constraints and multipliers. Users get `explicit_equations.ExplicitEquations` and
 `state_space.StateEquations`. Closed forms are recognised by the form of the equations and tested by values at random
 points (`zero_test`), never by a mechanism's name. `linear_systems` uses Cramer's rule up to three unknowns, else
-orthogonalisation without pivoting. A new closed form is a rule in `closed_form_loops`.
+orthogonalisation without pivoting; with pivots chosen by value it serves linear equations. A new closed form is a rule
+in `closed_form_loops`.
 """
 
 from __future__ import annotations

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...derivatives.reduced_equations import gap_lengths, normalised_rows
-from ...engine.rows import BY_TIME
+from ...derivatives.reduced_equations import gap_lengths, lost_constraints, normalised_rows
 from ...errors import ModelError, SingularityError
 from ...expression_graph.evaluation import evaluate, evaluate_array
-from ...expression_graph.graph import zero_objects
 from ...expression_graph.tracing import TracedEquations
-from ...laws.bytecode import evaluate_jet
 from ...model.model import listing, suggest
-from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from ...numerics.rank import RANK_TOLERANCE, null_space, rank
 from ...tables.structure_definition import Structure, velocity_names
 from .zero_test import Probe
 
@@ -48,26 +45,11 @@ class Constraints:
 
 
 def collect_constraints(x: TracedEquations) -> Constraints:
-    """Collect constraints: rows in the order of the multipliers, then prescribed coordinates."""
-    s, S, W = x.structure, x.system, x.work
-    there = len(x.g) > len(s.rows)  # prescribed coordinates are already among the rows
-    n = 0 if there else len(s.prescribed)
-    later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
-    G, g, nu, gamma = zero_objects(n, s.nv), zero_objects(n), zero_objects(n), zero_objects(n)
-    for k, b in enumerate(s.prescribed[name] for name in later[:n]):
-        law = S.tree.law[b]
-        value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
-        G[k, S.tree.v[b]] = 1.0
-        g[k] = x.q[S.tree.q[b]] - (value - S.bodies.offset[b])
-        nu[k], gamma[k] = rate, second
-    return Constraints(
-        [r.element.name for r in s.rows] + later,
-        np.array([r.holonomic for r in s.rows] + [True] * len(later), bool),
-        np.concatenate([x.g, g]),
-        np.concatenate([x.G.reshape(-1, s.nv), G]),
-        np.concatenate([x.nu, nu]),
-        np.concatenate([x.gamma, gamma]),
-    )
+    """Constraints of equations that have rows for prescribed coordinates (`with_prescribed_rows`)."""
+    s = x.structure
+    elements = [*(r.element.name for r in s.rows), *s.prescribed]
+    holonomic = np.array([*(r.holonomic for r in s.rows), *(True for _ in s.prescribed)], bool)
+    return Constraints(elements, holonomic, x.g, x.G, x.nu, x.gamma)
 
 
 DEPENDENCE_TOLERANCE = 1e-8  # smallest motion of an independent coordinate, relative to the largest
@@ -228,12 +210,14 @@ class ConstraintValues:
         which = np.flatnonzero(self.c.holonomic)
         if not f.chosen or not len(which):
             return
-        here = rank(normalised_rows(self.G[which], self.scale))
+        here = normalised_rows(self.G[which], self.scale)
         rng = np.random.default_rng(0)
         for _ in range(2):
             G = self._nearby(rng, which)
-            if G is not None and rank(normalised_rows(G, self.scale)) > here:
-                raise singular_start_error(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
+            there = here if G is None else normalised_rows(G, self.scale)
+            if rank(there) > rank(here):
+                lost = lost_constraints(here, there, [self.c.elements[k] for k in which])
+                raise singular_start_error(lost, self.values[self.x.t.data.name])
 
     def _nearby(self, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
         """Jacobian of the position constraints at the assembled position near a random step; None if assembly fails."""
@@ -260,13 +244,3 @@ class ConstraintValues:
             if len(q) > len(v):
                 moved /= np.linalg.norm(moved)
             values |= {names[k]: float(y) for k, y in zip(q, moved, strict=True)}
-
-    def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
-        """Elements whose rows take part in dependencies that nearby positions do not have."""
-        y, span = (
-            fundamental_subspaces(normalised_rows(here, self.scale)).dependencies,
-            fundamental_subspaces(normalised_rows(there, self.scale)).span,
-        )
-        part = np.abs(y @ (y.T @ span)).max(axis=1)
-        found = [self.c.elements[k] for k, p in zip(which, part, strict=True) if p > 1e-3]
-        return list(dict.fromkeys(found))

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...errors import AnalysisError, SingularityError
 from ...expression_graph.evaluation import evaluate, jacobian, symbols_of
 from ...expression_graph.graph import Node
-from .linear_systems import Determinants, solve_blocks, sparse_product
+from .linear_systems import Determinants, solve_blocks
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def implicit_rates(
         own, others = jacobian(d.residuals, d.symbols), jacobian(d.residuals, by)
         if found:
             before = jacobian(d.residuals, [w for w, _ in found])
-            others = others + sparse_product(before, np.array([row for _, row in found], object))
+            others = others + product(before, np.array([row for _, row in found], object))
         X = solve_blocks(own, others, dets)
         found += [(w, [-y for y in row]) for w, row in zip(d.symbols, X, strict=True)]
     return found

@@ -1,9 +1,10 @@
-"""Small linear systems solved in straight-line code on expressions, without inverses or pivoting.
+"""Linear systems of expressions: without pivoting in straight-line code, and with pivots chosen by value.
 
-Equations and unknowns are matched (Hopcroft and Karp 1973) and ordered in block triangular form (the strongly
-connected components of Tarjan 1972; Duff and Reid 1978). Blocks of up to three are solved by Cramer's rule, whose
-determinants vanish at a singular position; larger ones by orthogonalisation (modified Gram-Schmidt of the matrix
-with its right-hand sides appended, which is backward stable without pivoting: Björck 1967).
+Without pivoting, equations and unknowns are matched (Hopcroft and Karp 1973) and ordered in block triangular form (the
+strongly connected components of Tarjan 1972; Duff and Reid 1978). Blocks of up to three are solved by Cramer's rule,
+whose determinants vanish at a singular position; larger ones by orthogonalisation (modified Gram-Schmidt of the matrix
+with its right-hand sides appended, which is backward stable without pivoting: Björck 1967). `solve_equations` is
+Gaussian elimination with pivots chosen by the parameters' own values.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...expression_graph.graph import zero_objects
 from ...math.scalar import sqrt
 
@@ -103,7 +105,7 @@ def solve_blocks(A: np.ndarray, B: np.ndarray, dets: Determinants, order: list[B
     X = zero_objects(*B.shape)
     done: list[int] = []
     for rows, columns in order:
-        right = B[rows] - sparse_product(A[np.ix_(rows, done)], X[done])
+        right = B[rows] - product(A[np.ix_(rows, done)], X[done])
         X[columns] = _block(A[np.ix_(rows, columns)], right, columns, dets)
         done += columns
     return X
@@ -114,23 +116,13 @@ def transposed_blocks(order: list[Block]) -> list[Block]:
     return [(columns, rows) for rows, columns in reversed(order)]
 
 
-def sparse_product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Product A B, skipping zeros."""
-    out = zero_objects(len(A), *B.shape[1:])
-    for i, row in enumerate(A):
-        for k, a in enumerate(row):
-            if a != 0.0:
-                out[i] = out[i] + a * B[k]
-    return out
-
-
 def _block(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determinants) -> np.ndarray:
     n = len(A)
     if n > MAX_CRAMER:
         return _orthogonal(A, B, columns, dets)
     adjugate, det = _adjugate(A)
     dets.add(columns, det)
-    return sparse_product(adjugate, B) / det
+    return product(adjugate, B) / det
 
 
 def _adjugate(A: np.ndarray) -> tuple[np.ndarray, Any]:
@@ -168,7 +160,7 @@ def _orthogonal(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determin
     dets.add(columns, det)
     X = zero_objects(*B.shape)
     for k in reversed(range(n)):
-        X[k] = (Y[k] - sparse_product(R[k : k + 1, k + 1 :], X[k + 1 :])[0]) / R[k, k]
+        X[k] = (Y[k] - product(R[k : k + 1, k + 1 :], X[k + 1 :])[0]) / R[k, k]
     return X
 
 
@@ -187,9 +179,107 @@ def solve_symmetric(M: np.ndarray, B: np.ndarray, pivots: Determinants) -> np.nd
         pivots.add([k], D[k])
     X = B.copy()
     for k in range(n):
-        X[k] = X[k] - sparse_product(L[k : k + 1, :k], X[:k])[0]
+        X[k] = X[k] - product(L[k : k + 1, :k], X[:k])[0]
     for k in range(n):
         X[k] = X[k] / D[k]
     for k in reversed(range(n)):
-        X[k] = X[k] - sparse_product(L[k + 1 :, k : k + 1].T, X[k + 1 :])[0]
+        X[k] = X[k] - product(L[k + 1 :, k : k + 1].T, X[k + 1 :])[0]
     return X
+
+
+GOOD_PIVOT = 1e-3  # smallest accepted pivot relative to the largest, if its expression is simpler
+ZERO_TOLERANCE = 1e-12  # pivots below this part of their row count as zero
+
+
+class DependentEquations(Exception):
+    """The equations are dependent: ``row`` has no pivot."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__(f"row {row} depends on the others")
+        self.row = row
+
+
+def nominal_value(x: Any) -> float:
+    """Value of an expression with the parameters' own values."""
+    return float(x.real)
+
+
+def nominal_values(A: np.ndarray) -> np.ndarray:
+    """Values of an array of expressions."""
+    return np.array([nominal_value(x) for x in A.ravel()], float).reshape(A.shape)
+
+
+def is_zero(x: Any) -> bool:
+    """Whether an expression is identically zero."""
+    return bool(x == 0.0)
+
+
+def solve_equations(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Solve A X = B.
+
+    Parameters
+    ----------
+    A : ndarray (n, n)
+        Nodes or numbers.
+    B : ndarray (n, m)
+
+    Raises
+    ------
+    DependentEquations
+        If A is singular with the parameters' own values.
+    """
+    A, B = A.astype(object), B.astype(object)
+    n = len(A)
+    size = np.abs(nominal_values(A)).max(axis=1, initial=0.0)
+    left, columns = list(range(n)), list(range(n))
+    order: list[tuple[int, int]] = []
+    for _ in range(n):
+        i, j = _pivot(A, left, columns, size)
+        order.append((i, j))
+        left.remove(i)
+        columns.remove(j)
+        for k in left:
+            if not is_zero(A[k, j]):
+                f = A[k, j] / A[i, j]
+                _subtract_multiple(A[k], f, A[i], columns)
+                _subtract_multiple(B[k], f, B[i], range(B.shape[1]))
+                A[k, j] = 0.0
+    X = zero_objects(n, B.shape[1])
+    known: list[int] = []
+    for i, j in reversed(order):
+        for m in range(B.shape[1]):
+            x = B[i, m]
+            for k in known:
+                if not is_zero(A[i, k]) and not is_zero(X[k, m]):
+                    x = x - A[i, k] * X[k, m]
+            X[j, m] = x / A[i, j] if not is_zero(x) else 0.0
+        known.append(j)
+    return X
+
+
+def _subtract_multiple(row: np.ndarray, f: Any, other: np.ndarray, columns: Sequence[int]) -> None:
+    for m in columns:
+        if not is_zero(other[m]):
+            row[m] = row[m] - f * other[m]
+
+
+def _pivot(A: np.ndarray, remaining: Sequence[int], columns: Sequence[int], size: np.ndarray) -> tuple[int, int]:
+    """Simplest entry that is large enough: a number, in a row and column with few others (Markowitz 1957)."""
+    found = []
+    part = {
+        (i, j): abs(nominal_value(A[i, j])) / (size[i] or 1.0)
+        for i in remaining
+        for j in columns
+        if not is_zero(A[i, j])
+    }
+    largest = max(part.values(), default=0.0)
+    if not largest > ZERO_TOLERANCE:
+        raise DependentEquations(remaining[0])
+    for (i, j), x in part.items():
+        if x >= GOOD_PIVOT * largest:
+            r = sum((i, k) in part for k in columns) - 1
+            c = sum((k, j) in part for k in remaining) - 1
+            known = isinstance(A[i, j], int | float) or A[i, j].known
+            found.append((r * c, not known, -x, i, j))
+    *_, i, j = min(found)
+    return i, j

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...derivatives.reduced_equations import normalised_rows
 from ...errors import ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, symbols_of
@@ -42,7 +43,6 @@ from .linear_systems import (
     solution_blocks,
     solve_blocks,
     solve_symmetric,
-    sparse_product,
     transposed_blocks,
 )
 from .zero_test import Probe
@@ -366,16 +366,16 @@ class _Reduction:
         Z[chosen] = np.eye(n)
         Z[dependent], b[dependent] = -X[:, :n], X[:, n + 1]
         u = np.array([x.v[d] for d in chosen], object)
-        w = X[:, n] + sparse_product(Z[dependent], u)
+        w = X[:, n] + product(Z[dependent], u)
         definitions = [*solved.definitions, *self._each([x.v[d] for d in dependent], w, "constraints on velocities")]
-        M = sparse_product(Z.T, sparse_product(x.M, Z))
-        f = sparse_product(Z.T, x.f - sparse_product(x.M, b))
+        M = product(Z.T, product(x.M, Z))
+        f = product(Z.T, x.f - product(x.M, b))
         pivots = Determinants()
         a = solve_symmetric(M, f[:, None], pivots)[:, 0] if n else zero_objects(0)
         self._record_singular("inertia of", pivots, [self.names[d] for d in chosen])
-        vdot = sparse_product(Z, a) + b
+        vdot = product(Z, a) + b
         dets = Determinants()
-        missing = (sparse_product(x.M, vdot) - x.f)[dependent]
+        missing = (product(x.M, vdot) - x.f)[dependent]
         lam = solve_blocks(Gw.T, missing[:, None], dets, transposed_blocks(order or []))[:, 0]
         definitions += self._multipliers(rows, lam)
         definitions += self._each(self.more.vdot, vdot, "accelerations") if self.more.vdot else []

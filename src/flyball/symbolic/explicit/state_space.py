@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, symbols_of
 from ...expression_graph.graph import Node, OpaqueFunction
 from ..expressions import TOO_LONG, Expressions, formula_lines
 from .definitions import ImplicitSolver, implicit_rates
 from .explicit_equations import ExplicitEquations
-from .linear_systems import Determinants, sparse_product
+from .linear_systems import Determinants
 
 StateNumbers = Sequence[float] | np.ndarray
 
@@ -21,8 +22,8 @@ StateNumbers = Sequence[float] | np.ndarray
 class StateEquations:
     """State space of a mechanism, with names: x' = f(x, u, t), y = h(x, u, t).
 
-    The states are the independent coordinates (all four Euler parameters of a body's orientation), then their rates. An
-    input that moves a driver counts as three: itself, its rate and its acceleration.
+    The states are the independent coordinates (all four Euler parameters of a body's orientation), their rates, and the
+    states of controllers. An input that moves a driver counts as three: itself, its rate and its acceleration.
 
     Attributes
     ----------
@@ -41,11 +42,11 @@ class StateEquations:
         if isinstance(outputs, str):
             outputs = [outputs]
         self.t, self.graph = e.traced.t, e.traced.graph
-        self.x = [*(e.traced.q[k] for k in e.known), *(e.traced.v[d] for d in e.chosen)]
+        self.x = [*(e.traced.q[k] for k in e.known), *(e.traced.v[d] for d in e.chosen), *e.traced.states]
         self.u, self.inputs = list(explicit.inputs.values()), tuple(explicit.inputs)
         self.states, self.outputs = tuple(s.data.name for s in self.x), tuple(outputs)
-        qdot = sparse_product(e.traced.T, np.array(e.traced.v, object))[e.known]
-        f = e.inlined([self.graph.node(y) for y in (*qdot, *e.accelerations[e.chosen])])
+        qdot = product(e.traced.T, np.array(e.traced.v, object))[e.known]
+        f = e.inlined([self.graph.node(y) for y in (*qdot, *e.accelerations[e.chosen], *e.traced.state_rates)])
         self.f = Expressions(self.equations, _expression_vector(f), self.states)
         self.h = Expressions(
             self.equations, _expression_vector([_output_expression(explicit, name) for name in outputs]), self.outputs
@@ -97,9 +98,7 @@ class StateEquations:
             chain = implicit_rates(self._implicit, seeds, Determinants())
             if chain:
                 held = jacobian(nodes, [w for w, _ in chain])
-                out = out + sparse_product(
-                    held, np.array([row for _, row in chain], object).reshape(len(chain), len(seeds))
-                )
+                out = out + product(held, np.array([row for _, row in chain], object).reshape(len(chain), len(seeds)))
         except OpaqueFunction as error:
             raise ModelError(f"{error}; give the law as a text, or its values as a table") from None
         return Expressions(self.equations, out, what.rows, names)

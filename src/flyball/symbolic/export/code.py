@@ -59,18 +59,22 @@ def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> st
         "",
         f"Coordinates: {eq.coordinates}.",
     ]
-    lists = {"q": eq.q.rows, "v": eq.v.rows, "lam": eq.lam.rows, "u": eq.inputs, "p": tuple(eq.parameters)}
-    for name, items in lists.items():
+    for name, items in argument_names(eq).items():
         if items:
             told += textwrap.wrap(f"{name} ({len(items)}): {', '.join(items)}", 105, subsequent_indent="    ")
     told += [f"{r.name}: {r.operations} operations" for r in routines]
     return "\n".join(told)
 
 
+def argument_names(eq: Equations) -> dict[str, tuple[str, ...]]:
+    """Names of the entries of each argument."""
+    named = {k: getattr(eq, k).rows for k in ("q", "v", "z", "lam")}
+    return named | {"u": eq.inputs, "p": tuple(eq.parameters)}
+
+
 def argument_constants(eq: Equations, start: Mapping[str, np.ndarray]) -> dict[str, Sequence[object]]:
     """Names of the arguments' entries, and their initial values."""
-    names = {"q": eq.q.rows, "v": eq.v.rows, "lam": eq.lam.rows, "u": eq.inputs, "p": tuple(eq.parameters)}
-    named = {f"{k}_names": x for k, x in names.items() if x}
+    named = {f"{k}_names": x for k, x in argument_names(eq).items() if x}
     return named | {
         f"{k}_start" if k != "p" else "p_values": x.tolist() for k, x in start.items() if k != "u" and len(x)
     }
@@ -98,8 +102,8 @@ class Code:
     names : dict of str to tuple of str
         Names of the entries of each argument: ``names["q"]``.
     start : dict of str to ndarray
-        ``q`` and ``v`` as described and assembled, curve parameters ``places``, values of the inputs ``u`` and
-        parameters ``p``.
+        ``q``, ``v`` and controller states ``z`` as described and assembled, curve parameters ``places``, values of the
+        inputs ``u`` and parameters ``p``.
     files : tuple of Path
         Files that were written.
     """
@@ -213,7 +217,7 @@ def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
     known = eq.checked(eq.start, wanted)
     values: dict[str, list[float]] = {
         k: [float(known[x.data.name]) for x in made.arguments[k].nodes]
-        for k in ("q", "v", "places")
+        for k in ("q", "v", "z", "places")
         if k in made.arguments
     }
     given = {k: list(made.arguments[k].values or ()) for k in ("u", "p") if k in made.arguments}

@@ -66,6 +66,7 @@ class Functions:
             "t": Argument("t", x.t, "time"),
             "q": Argument("q", x.q, "coordinates"),
             "v": Argument("v", x.v, "velocities"),
+            "z": Argument("z", x.states, "states of controllers"),
             "vdot": Argument("vdot", eq.named_equations.vdot, "accelerations"),
             "lam": Argument("lam", x.lam, "multipliers"),
             "loads": Argument("loads", x.loads, "normal forces of joints with friction"),
@@ -230,6 +231,9 @@ def right_hand_side(x: Functions) -> FunctionParts:
         "lam": "multipliers: reactions are G^T lam",
     }
     places = x.equations.named_equations.places
+    if T.states:
+        results["zdot"] = T.state_rates
+        meanings["zdot"] = "rates of the states of controllers"
     if T.loads:
         results["loads"] = found.loads
         meanings["loads"] = "of joints with friction [N]"

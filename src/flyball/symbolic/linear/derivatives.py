@@ -1,10 +1,10 @@
 """A mechanism's equations traced for linearisation, and their derivatives by state, multipliers and inputs.
 
-    r = M vdot - f - G^T lam,  g,  n = G v - nu,  y
+    r = M vdot - f - G^T lam,  g,  n = G v - nu,  s = zdot,  y
 
 are differentiated by positions (along the velocities, so that quaternions have three directions), velocities,
-accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions' directions,
-d(G^T lam)/dx, is in dr/dx.
+controller states, accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions'
+directions, d(G^T lam)/dx, is in dr/dx.
 """
 
 from __future__ import annotations
@@ -20,12 +20,18 @@ from ...engine.kinematics import quaternion_at
 from ...errors import ModelError
 from ...expression_graph.evaluation import directional_derivatives, evaluate, substitute
 from ...expression_graph.graph import Graph, Node, Symbol, object_vector, zero_objects
-from ...expression_graph.tracing import TracedEquations, object_tables, parameter_symbols, trace_equations
-from ...laws.bytecode import BY_TIME, evaluate_jet
+from ...expression_graph.tracing import (
+    TracedEquations,
+    object_tables,
+    parameter_symbols,
+    trace_equations,
+    with_prescribed_rows,
+)
 from ...model.contact import has_contact
 from ...model.element_laws import Input, with_inputs
 from ...model.model import Model
 from ...model.quantities import single_quantity
+from ...model.unsupported_elements import refuse_sampled_controllers
 from ...results.health import Health
 from ...results.result import Result
 from ...tables.structure import Choices, structure
@@ -51,15 +57,11 @@ class TracedMechanism:
         Names of all velocities.
     vdot : list of Node
         Symbols of the accelerations.
-    g, n : ndarray (rows,)
-        Constraints on positions, and on velocities, G v - nu; prescribed coordinates follow the rows.
-    multipliers : list of Node
-        Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts).
+    n : ndarray (rows,)
+        Constraints on velocities, G v - nu; prescribed coordinates follow the rows.
     r : ndarray (nv,)
-        M vdot - f - G^T lam - efforts.
+        M vdot - f - G^T lam.
     holonomic : ndarray of bool (rows,)
-    laws : list of (index of coordinate, index of velocity, Node, Node)
-        Prescribed coordinates, and the expressions of their values and rates.
     """
 
     values: Values
@@ -69,17 +71,29 @@ class TracedMechanism:
     inputs: list[Input]
     names: list[VelocityName]
     vdot: list[Node]
-    g: np.ndarray
     n: np.ndarray
-    multipliers: list[Node]
     r: np.ndarray
     holonomic: np.ndarray
-    laws: list[tuple[int, int, Node, Node]]
 
     @property
     def graph(self) -> Graph:
         """The graph of all expressions."""
         return self.x.graph
+
+    @property
+    def g(self) -> np.ndarray:
+        """Constraints on positions, (rows,); prescribed coordinates follow the rows."""
+        return self.x.g
+
+    @property
+    def s(self) -> np.ndarray:
+        """Rates of the controller states, (nz,)."""
+        return self.x.state_rates
+
+    @property
+    def multipliers(self) -> list[Node]:
+        """Symbols of the multipliers of the rows, then of prescribed coordinates (their efforts)."""
+        return self.x.lam
 
     @property
     def model(self) -> Model:
@@ -95,6 +109,11 @@ class TracedMechanism:
     def added(self) -> list[Node]:
         """Symbols of the inputs that are no parameters of the mechanism: zero at the point."""
         return [self.given[i.parameter] for i in self.inputs if i.name != i.parameter]
+
+    @property
+    def controls(self) -> list[str]:
+        """Names of the controller states."""
+        return [x.name for x in self.values.structure.controls]
 
     @cached_property
     def scale(self) -> np.ndarray:
@@ -133,8 +152,9 @@ def trace_mechanism(
     Raises
     ------
     ModelError
-        If there is no such input, or the mechanism has contact or laws that are Python functions.
+        If there is no such input, or the mechanism has contact, sampled controllers or laws that are Python functions.
     """
+    refuse_sampled_controllers(model, "symbolic")
     if has_contact(model):
         raise ModelError(
             f"{model.name!r} has contact, which is no set of equations; linearize takes it where it rests, in numbers"
@@ -152,22 +172,13 @@ def trace_mechanism(
     V = values(s, given)  # type: ignore[arg-type]
     x = trace_equations(s, V.system if given else object_tables(V.system), graph)
     vdot = [graph.symbol(Symbol(f"a[{d}]", "acceleration", f"a_{{{d}}}")) for d in range(s.nv)]
-    laws = _prescribed(x)
-    efforts = [graph.symbol(Symbol(f"effort[{k}]", "multiplier")) for k in range(len(laws))]
-    r = x.M @ np.array(vdot, object) - x.f
-    if x.lam:
-        r = r - x.G.T @ np.array(x.lam, object)
-    for (_, d, _, _), effort in zip(laws, efforts, strict=True):
-        r[d] = r[d] - effort
+    efforts = [graph.symbol(Symbol(f"effort[{k}]", "multiplier")) for k in range(len(s.prescribed))]
+    x = with_prescribed_rows(x, [*x.lam, *efforts])
+    v, lam = object_vector(x.v), object_vector(x.lam)
+    r = x.M @ object_vector(vdot) - x.f - x.G.T @ lam
     r[:] = substitute(list(r), list(zip(x.loads, x.returned, strict=True)))
-    n = (x.G @ np.array(x.v, object) - x.nu).tolist() if x.lam else []
-    return TracedMechanism(
-        values=V, x=x, given=given, env=V.env, inputs=named, names=velocity_names(s), vdot=vdot,
-        g=object_vector([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
-        n=object_vector([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
-        multipliers=[*x.lam, *efforts], r=r,
-        holonomic=np.array([*(row.holonomic for row in s.rows), *(True for _ in laws)], bool), laws=laws,
-    )  # fmt: skip
+    holonomic = np.array([*(row.holonomic for row in s.rows), *(True for _ in efforts)], bool)
+    return TracedMechanism(V, x, given, V.env, named, velocity_names(s), vdot, x.G @ v - x.nu, r, holonomic)
 
 
 def refuse_unknown(model: Model, outputs: Sequence[str]) -> None:
@@ -185,19 +196,7 @@ def _with_values(model: Model, changed_parameters: Mapping[str, float]) -> Model
     return out
 
 
-def _prescribed(x: TracedEquations) -> list[tuple[int, int, Node, Node]]:
-    """Prescribed coordinates: indices of coordinate and velocity, expressions of value and rate."""
-    S, s = x.system, x.structure
-    stack = zero_objects(s.depth + 1, 3)
-    out = []
-    for b in s.prescribed.values():
-        f, f1, _ = evaluate_jet(S.code, S.const, int(S.tree.law[b]), stack, x.t, zero_objects(3, 0), BY_TIME)
-        law = x.graph.node(f - S.bodies.offset[b])
-        out.append((int(S.tree.q[b]), int(S.tree.v[b]), law, x.graph.node(f1)))
-    return out
-
-
-BY = ("x", "v", "a", "l", "w")
+BY = ("x", "v", "z", "a", "l", "w")
 
 
 @dataclass
@@ -207,9 +206,9 @@ class Perturbed:
     Attributes
     ----------
     value : dict
-        ``"r"``, ``"g"``, ``"n"``, ``"y"`` -> values.
+        ``"r"``, ``"g"``, ``"n"``, ``"s"``, ``"y"`` -> values.
     by : dict
-        ``"rx"`` -> derivatives of r by positions, and so on: rows ``r``, ``g``, ``n``, ``y``, columns `BY`.
+        ``"rx"`` -> derivatives of r by positions, and so on: rows ``r``, ``g``, ``n``, ``s``, ``y``, columns `BY`.
     N : ndarray (nv, nv)
         (rate of a change of position) = (change of velocity) + N (change of position).
     T : ndarray (nq, nv)
@@ -244,7 +243,7 @@ class Derivatives:
 
     def __init__(self, m: TracedMechanism, outputs: Sequence[Node]) -> None:
         self.m = m
-        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "y": _row(outputs)}
+        self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "s": m.s, "y": object_vector(outputs)}
         self.ends = np.cumsum([0, *(len(b) for b in self.blocks.values())])
         nodes = [x for b in self.blocks.values() for x in b]
         self.nodes = nodes
@@ -252,7 +251,7 @@ class Derivatives:
         along = [list(zip(x.q, x.T[:, d], strict=True)) for d in range(len(x.v))]
         seeds = {"x": [[(q, t) for q, t in a if t != 0.0] for a in along]}
         seeds |= {k: [[(s, 1.0)] for s in of] for k, of in zip(
-            BY[1:], (x.v, m.vdot, m.multipliers, m.pushed), strict=True
+            BY[1:], (x.v, x.states, m.vdot, m.multipliers, m.pushed), strict=True
         )}  # fmt: skip
         self.columns = {k: [directional_derivatives(nodes, s) for s in of] for k, of in seeds.items()}
         self.N = _turning(m)
@@ -273,7 +272,7 @@ class Derivatives:
 
     def _sorted(self, found: list[Any]) -> Perturbed:
         rows = len(self.nodes)
-        value = self._parted(_row(found[:rows]))
+        value = self._parted(object_vector(found[:rows]))
         at, by = rows, dict[str, np.ndarray]()
         for k in BY:
             count = len(self.columns[k])
@@ -283,18 +282,12 @@ class Derivatives:
                 at += rows
             by |= {f"{name}{k}": part for name, part in self._parted(J).items()}
         nv, nq = len(self.m.x.v), len(self.m.x.q)
-        N = _row(found[at : at + nv * nv]).reshape(nv, nv)
-        T = _row(found[at + nv * nv :]).reshape(nq, nv)
+        N = object_vector(found[at : at + nv * nv]).reshape(nv, nv)
+        T = object_vector(found[at + nv * nv :]).reshape(nq, nv)
         return Perturbed(value, by, N, T)
 
     def _parted(self, J: np.ndarray) -> dict[str, np.ndarray]:
         return {k: J[i:j] for k, i, j in zip(self.blocks, self.ends[:-1], self.ends[1:], strict=True)}
-
-
-def _row(x: Sequence[Any]) -> np.ndarray:
-    out = zero_objects(len(x))
-    out[:] = list(x)
-    return out
 
 
 def _turning(m: TracedMechanism) -> np.ndarray:

@@ -7,28 +7,22 @@ the parameters. A motion with constant rates must look the same at later times.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import gap_lengths
+from ...derivatives.force_balance import usual_states
+from ...derivatives.linear_reduction import product
+from ...derivatives.reduced_equations import gap_lengths, lost_constraints
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute
-from ...expression_graph.graph import SYMBOL, Node, zero_objects
-from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
-from .derivatives import Derivatives, TracedMechanism
-from .elimination import (
-    DependentEquations,
-    identically_zero,
-    matrix_product,
-    nominal_value,
-    nominal_values,
-    solve_equations,
-    values_and_sizes,
-)
+from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute, symbols_of
+from ...expression_graph.graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, SYMBOL, Node, zero_objects
+from ...numerics.rank import RANK_TOLERANCE, null_space, rank
+from ..explicit.linear_systems import DependentEquations, nominal_value, nominal_values, solve_equations
+from .derivatives import Derivatives, Perturbed, TracedMechanism
 from .operating_point import OperatingPoint
-from .reduction import Freedoms, reduce_linear, scaled_rows, with_bases_of
+from .reduction import Freedoms, reduce_linear, scaled_rows
 
 # Largest residual at an equilibrium, relative to the cancelling terms and to the largest force.
 BALANCE_TOLERANCE = 1e-6
@@ -72,10 +66,14 @@ def _forces(m: TracedMechanism, point: OperatingPoint) -> tuple[np.ndarray, np.n
 
 
 def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.ndarray, f: Freedoms) -> list[Node]:
-    """Forces along the free coordinates, which vanish at an equilibrium; identically zero ones are left out."""
+    """Forces along the free coordinates, and rates of controller states, which vanish at an equilibrium.
+
+    Identically zero ones are left out.
+    """
     r = zero_objects(len(m.r), 1)
-    r[:, 0] = substitute(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
-    found = substitute(list(matrix_product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
+    left = substitute([*m.r, *m.s], [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
+    r[:, 0] = left[: len(r)]
+    found = substitute([*product(f.Zv.T, r)[:, 0], *left[len(r) :]], [(s, 0.0) for s in m.added])
     return not_identically_zero(found)
 
 
@@ -85,15 +83,52 @@ def not_identically_zero(nodes: Sequence[Any]) -> list[Node]:
     return [x for x in told if not x.known]
 
 
-def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at: dict[str, float]) -> None:
+ROUNDING_TOLERANCE = 1e-12  # values below this part of the terms are rounding
+RANDOM_DRAWS = 3
+
+
+def values_and_sizes(nodes: Sequence[Any], values: Mapping[str, float] | None = None) -> list[tuple[float, float]]:
+    """(value, sum of the absolute values of all terms) of expressions, with the parameters' own or other values."""
+    told = values or {}
+    found: dict[int, tuple[float, float]] = {}
+    for x in nodes_in_order(nodes):
+        a = [found[k.index] for k in x.args]
+        own = [v for v, _ in a]
+        if x.op == NUMBER:
+            value = x.value
+        elif x.op == SYMBOL:
+            value = told.get(x.data.name, x.value)
+        else:
+            value = float(x.data.python(*own) if x.op == CALL else OPERATIONS[x.op](*own))
+        if x.op in (ADD, MULTIPLY):
+            size = float(OPERATIONS[x.op](*(s for _, s in a)))
+        elif x.op == DIVIDE:
+            size = a[0][1] / abs(own[1]) if own[1] else float("inf")
+        else:
+            size = 1.0 if x.op in ("sin", "cos") else abs(value)
+        found[x.index] = (value, size)
+    return [found[x.index] if isinstance(x, Node) else (float(x), abs(float(x))) for x in nodes]
+
+
+def identically_zero(nodes: Sequence[Any]) -> list[bool]:
+    """Which expressions are identically zero, tested with random parameter values near their own."""
+    rng = np.random.default_rng(0)
+    out = np.ones(len(nodes), bool)
+    for _ in range(RANDOM_DRAWS):
+        told = {s.data.name: (s.value or 0.1) * float(rng.uniform(0.7, 1.3)) for s in symbols_of(nodes)}
+        out &= np.array([abs(x) <= ROUNDING_TOLERANCE * size for x, size in values_and_sizes(nodes, told)], bool)
+    return [bool(x) for x in out]
+
+
+def refuse_unbalanced(m: TracedMechanism, f: Freedoms, p: Perturbed, at: dict[str, float]) -> None:
     """Refuse a point that is no equilibrium with the parameters' own values.
 
     Parameters
     ----------
     m : TracedMechanism
     f : Freedoms
-    stiffness : ndarray
-        Derivatives of r by positions there.
+    p : Perturbed
+        Derivatives there.
     at : dict
         Values at the point of all symbols that are no parameters with their own values.
 
@@ -112,17 +147,30 @@ def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at
     r = np.array(values_and_sizes(list(m.r), at)) * m.scale[:, None]
     Z = nominal_values(f.Zv) / m.scale[:, None] * m.scale[f.chosen_v]
     left, terms = Z.T @ r[:, 0], np.abs(Z).T @ r[:, 1]
-    near = np.abs(nominal_values(stiffness) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
+    near = np.abs(nominal_values(p.by["rx"]) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
     for d, x, own in zip(f.chosen_v, left, terms, strict=True):
         if abs(x) > BALANCE_TOLERANCE * (own + 1e-3 * r[:, 1].max()) + ZERO_FORCE_TOLERANCE * near[d]:
             name = m.names[d]
-            others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
-            raise ModelError(
-                f"{m.model.name!r} is in no equilibrium there: {x / m.scale[d]:.6g} "
-                f"{'N' if name.unit == 'm' else 'N m'} are left along {name.name}. Give another point, for instance "
-                f"at=m.equilibrium(), or name a parameter that has the value which balances it: "
-                f"balanced_by=[...]{others}"
-            )
+            unit = "N" if name.unit == "m" else "N m"
+            raise _unbalanced_error(m, f"{x / m.scale[d]:.6g} {unit} are left along {name.name}", moving)
+    moved = np.abs(nominal_values(p.by["sx"]) * m.scale * m.values.length).sum(axis=1)
+    between = np.abs(nominal_values(p.by["sz"]))
+    decay = np.diag(between)
+    z = np.abs([at[s.data.name] for s in m.x.states])
+    usual = usual_states(z, moved, between, np.where(decay > 0.0, decay, decay.max(initial=0.0) or 1.0))
+    may = ZERO_FORCE_TOLERANCE * (moved + between @ usual)
+    for name, (x, own), least in zip(m.controls, values_and_sizes(list(m.s), at), may, strict=True):
+        if abs(x) > BALANCE_TOLERANCE * own + least:
+            raise _unbalanced_error(m, f"{name!r} changes by {x:.3g} in a second", moving)
+
+
+def _unbalanced_error(m: TracedMechanism, what: str, moving: bool) -> ModelError:
+    others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
+    return ModelError(
+        f"{m.model.name!r} is in no equilibrium there: {what}. Give another point, for instance at=m.equilibrium(), or "
+        f"name a parameter{' or controller state' if m.controls else ''} that has the value which balances it: "
+        f"balanced_by=[...]{others}"
+    )
 
 
 def unsteady_error(m: TracedMechanism) -> AnalysisError:
@@ -143,7 +191,7 @@ def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence
     at : sequence of Node
         The conditions.
     names : sequence of str
-        As many parameters, in which the conditions are linear.
+        As many parameters or controller states, in which the conditions are linear.
 
     Raises
     ------
@@ -276,7 +324,7 @@ def _matrix(m: TracedMechanism, d: Derivatives, f: Freedoms, at: dict[str, float
     """Matrix A in numbers, in the same coordinates."""
     p = d.near(at)
     n = f.Z.shape[1] + f.Zv.shape[1]
-    return nominal_values(reduce_linear(m, p, with_bases_of(f, p)).rate[:, :n])
+    return nominal_values(reduce_linear(m, p, replace(f, G=p.by["nv"])).rate[:, :n])
 
 
 def _moved(m: TracedMechanism, at: dict[str, float], v: np.ndarray, h: float) -> None:
@@ -309,6 +357,8 @@ def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) ->
     if not len(which):
         return
     now = _rows(m, G, here)[which]
+    s = m.values.structure
+    of = [*(r.element.name for r in s.rows if r.holonomic), *s.prescribed]
     N = null_space(now)
     rng = np.random.default_rng(0)
     for _ in range(2 if N.shape[1] else 0):
@@ -316,8 +366,9 @@ def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) ->
         step *= NEARBY_STEP * m.values.length / np.abs(step / m.scale).max()
         there = _nearby(m, G, dict(here), step, which)
         if there is not None and rank(there) > rank(now):
+            lost = ", ".join(lost_constraints(now, there, of))
             raise ModelError(
-                f"{m.model.name!r} is in a singular position there: the constraints of {_lost(m, now, there, which)} "
+                f"{m.model.name!r} is in a singular position there: the constraints of {lost} "
                 f"depend on each other at this point and not nearby, so that there are no linear equations; give "
                 f"another point"
             )
@@ -342,12 +393,3 @@ def _nearby(
             return _rows(m, G, at)[which]
         step = m.scale * np.linalg.lstsq(scaled_rows(A, m.scale), -g, rcond=RANK_TOLERANCE)[0]
     return None
-
-
-def _lost(m: TracedMechanism, now: np.ndarray, there: np.ndarray, which: np.ndarray) -> str:
-    """Elements whose rows take part in dependencies that nearby positions do not have."""
-    here, span = fundamental_subspaces(now).dependencies, fundamental_subspaces(there).span
-    part = np.abs(here @ (here.T @ span)).max(axis=1)
-    s = m.values.structure
-    of = [*(r.element.name for r in s.rows), *s.prescribed]
-    return ", ".join(dict.fromkeys(of[k] for k, x in zip(which, part, strict=True) if x > 1e-3))

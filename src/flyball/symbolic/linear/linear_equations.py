@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.evaluation import evaluate, substitute, symbols_of
-from ...expression_graph.graph import Node
+from ...expression_graph.graph import Node, Symbol
 from ...linear.operating_point import operating_state
 from ...model.messages import listing, suggest
 from ...model.model import Model
@@ -19,9 +19,9 @@ from ...results.equilibrium import Equilibrium
 from ...results.result import Result
 from ...results.wording import with_unit
 from ...tables.coordinate_choice import spanning_joints
+from ..explicit.linear_systems import nominal_value
 from ..expressions import Expressions, SymbolTable
 from .derivatives import Derivatives, Perturbed, TracedMechanism, refuse_unknown, trace_mechanism
-from .elimination import nominal_value
 from .equilibrium import (
     Validity,
     balancing_multipliers,
@@ -45,7 +45,7 @@ FACTORED = 300  # operations up to which entries are factored for display
 class LinearEquations(SymbolTable):
     """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the mechanism's parameters.
 
-    The states are changes of as many coordinates as there are freedoms, then changes of their rates, as in
+    The states are changes of as many coordinates as there are freedoms, of their rates, and of controller states, as in
     `LinearModel`.
 
     Attributes
@@ -327,7 +327,8 @@ def linear_equations(
     independent : sequence of str
         Coordinates whose changes are the states; chosen by pivoting if not given.
     balanced_by : sequence of str
-        Parameters that are solved for so that the point is an equilibrium, as many as there are conditions.
+        Parameters and controller states that are solved for so that the point is an equilibrium, as many as there are
+        conditions.
     parameters : mapping, optional
         Values that replace the model's own, in SI units or with a unit.
 
@@ -352,6 +353,9 @@ def linearize_about(model: Model, o: LinearizationOptions) -> LinearEquations:
     """As `linear_equations`."""
     refuse_unknown(model, o.outputs)
     m, point = _traced_at_point(model, o)
+    for name in {*o.balanced_by} & {*m.controls}:  # unknown for now
+        k = m.controls.index(name)
+        point.z[k] = m.given[name] = m.graph.symbol(Symbol(name, "parameter"), nominal_value(point.z[k]))
     curves = [m.output(name) for name in o.outputs]
     d = Derivatives(m, [y for _, y in curves])
     where = point.replacing(m)
@@ -361,10 +365,11 @@ def linearize_about(model: Model, o: LinearizationOptions) -> LinearEquations:
     lam = balancing_multipliers(m, point, f)
     at_rest = equilibrium_conditions(m, point, lam, f)
     pairs = balancing_parameters(m, at_rest, o.balanced_by) if o.balanced_by else []
-    point = OperatingPoint(substitute(point.q, pairs), substitute(point.v, pairs), point.z, point.t, point.found)
+    q, v, z = (substitute(part, pairs) for part in (point.q, point.v, point.z))
+    point = OperatingPoint(q, v, z, point.t, point.found)
     lam[:] = substitute(list(lam), pairs)
     known = {s.data.name: nominal_value(x) for s, x in [*pairs, *zip(m.multipliers, lam, strict=True)]}
-    refuse_unbalanced(m, f, first.by["rx"], point.numbers(m) | _loads_at_rest(m) | known)
+    refuse_unbalanced(m, f, first, point.numbers(m) | _loads_at_rest(m) | known)
     where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
     p = d.at(where).replaced(pairs) if pairs else d.at(where)
     f = find_freedoms(m, p, o.independent)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...assembly.compiled_mechanism import compile_mechanism
+from ...derivatives.linear_reduction import product
 from ...errors import ModelError
 from ...expression_graph.evaluation import evaluate, jacobian, substitute
 from ...expression_graph.graph import Node, zero_objects
@@ -21,8 +22,9 @@ from ...model.expressions import number as number_of
 from ...model.messages import listing, suggest
 from ...numerics.rank import RANK_TOLERANCE
 from ...tables.forest import tree_joint_steps
+from ...tables.law_inputs import initial_controller_states
+from ..explicit.linear_systems import is_zero, nominal_value, nominal_values, solve_equations
 from .derivatives import TracedMechanism
-from .elimination import is_zero, matrix_product, nominal_value, nominal_values, solve_equations
 
 CONSISTENCY_TOLERANCE = 1e-9  # relative difference below which velocities are equal
 
@@ -60,7 +62,7 @@ def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[
     rows, columns = _independent(nominal_values(A) * m.scale), _independent(nominal_values(A).T)
     v = zero_objects(nv, 1)
     v[columns] = solve_equations(A[np.ix_(rows, columns)], right[rows])
-    missed = nominal_values(matrix_product(A, v)) - nominal_values(right)
+    missed = nominal_values(product(A, v)) - nominal_values(right)
     if np.abs(missed).max() > CONSISTENCY_TOLERANCE * np.abs(nominal_values(right)).max():
         raise ModelError(
             f"the joints of {m.model.name!r} do not allow the given velocities of its bodies; give "
@@ -127,8 +129,8 @@ class OperatingPoint:
     ----------
     q, v : list
         Coordinates and velocities: nodes or numbers.
-    z : list of float
-        Turn counters of angles, curve parameters.
+    z : list
+        Controller states; then turn counters of angles, curve parameters, as numbers.
     t : float [s]
     found : tuple of str
         Coordinates that were computed to close loops: numbers, independent of the parameters.
@@ -136,7 +138,7 @@ class OperatingPoint:
 
     q: list[Any]
     v: list[Any]
-    z: list[float]
+    z: list[Any]
     t: float = 0.0
     found: tuple[str, ...] = ()
 
@@ -172,9 +174,10 @@ def reference_point(m: TracedMechanism) -> OperatingPoint:
     x, n = m.values, m.values.structure
     q, v = x.q.tolist(), x.v.tolist()
     z = compile_mechanism(m.model, tree=n.tree, coupled=bool(n.tree)).z.real.tolist()
+    z[: len(m.s)] = initial_controller_states(n, x.numbers)
     if n.tree:
         v = joint_velocities(m, [*zip(m.x.q, q, strict=True), *zip(m.x.z, z, strict=True)])
-    at = state_entries(m)
+    at, point = state_entries(m), OperatingPoint(q, v, z)
     for e in m.model.initial:
         for name, value in _initial_condition(m, e):
             if value is not None and name not in at:
@@ -183,10 +186,11 @@ def reference_point(m: TracedMechanism) -> OperatingPoint:
                     "the position: at={...}, or at=m.equilibrium()"
                 )
             if value is not None:
-                _set_entry(q, v, at[name], value)
-    for k, d, law, rate in m.laws:
-        q[k], v[d] = substitute([law, rate], [(m.x.t, 0.0)])
-    return OperatingPoint(q, v, z)
+                at[name].set(point, value)
+    for k, b in enumerate(n.prescribed.values(), len(n.rows)):
+        at_q, at_v = int(m.x.system.tree.q[b]), int(m.x.system.tree.v[b])
+        q[at_q], v[at_v] = substitute([-m.g[k], m.x.nu[k]], [(m.x.t, 0.0), (m.x.q[at_q], 0.0)])
+    return point
 
 
 def _initial_condition(m: TracedMechanism, e: Initial) -> list[tuple[str, Any]]:
@@ -199,42 +203,39 @@ def _initial_condition(m: TracedMechanism, e: Initial) -> list[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class StateEntry:
-    """Index of a named coordinate or rate in the state: value = x + offset."""
+    """Index of a named coordinate, rate or controller state in a part (q, v, z) of the state: value = x + offset."""
 
+    part: str
     k: int
-    rate: bool
     offset: Any = 0.0
+
+    def set(self, point: OperatingPoint, value: Any) -> None:
+        """Set it in an operating point."""
+        getattr(point, self.part)[self.k] = value - self.offset
 
 
 def state_entries(m: TracedMechanism) -> dict[str, StateEntry]:
-    """Names that may be given for a state: coordinates and, as ``"A.angle rate"``, their rates."""
+    """Names that may be given for a state: coordinates, as ``"A.angle rate"`` their rates, and controller states."""
     s, S = m.values.structure, m.x.system
     out: dict[str, StateEntry] = {}
     for t, row, step in tree_joint_steps(s):
         if step.coordinate in t.joint.coordinates:
             name = f"{t.joint.name}.{step.coordinate}"
-            out[name] = StateEntry(int(S.tree.q[row]), False, S.bodies.offset[row])
-            out[f"{name} rate"] = StateEntry(int(S.tree.v[row]), True)
+            out[name] = StateEntry("q", int(S.tree.q[row]), S.bodies.offset[row])
+            out[f"{name} rate"] = StateEntry("v", int(S.tree.v[row]))
     for d, own in enumerate(m.names):
         if own.name not in out:
             k = _coordinate_of_velocity(m, d)
             if k >= 0:
-                out[own.name] = StateEntry(k, False)
-            out[f"{own.name} rate"] = StateEntry(d, True)
-    return out
+                out[own.name] = StateEntry("q", k)
+            out[f"{own.name} rate"] = StateEntry("v", d)
+    return out | {name: StateEntry("z", k) for k, name in enumerate(m.controls)}
 
 
 def _coordinate_of_velocity(m: TracedMechanism, d: int) -> int:
     """Index of the coordinate whose rate a velocity is; -1 for angular velocities in space."""
     column = [k for k in range(len(m.x.q)) if m.x.T[k, d] != 0.0]
     return column[0] if len(column) == 1 and m.x.T[column[0], d] == 1.0 else -1
-
-
-def _set_entry(q: list[Any], v: list[Any], p: StateEntry, value: Any) -> None:
-    if p.rate:
-        v[p.k] = value
-    else:
-        q[p.k] = value - p.offset
 
 
 def given_point(m: TracedMechanism, at: Mapping[str, Any]) -> OperatingPoint:
@@ -255,10 +256,8 @@ def given_point(m: TracedMechanism, at: Mapping[str, Any]) -> OperatingPoint:
             )
         p = known[name]
         unit = next((n.unit for n in m.names if name in (n.name, f"{n.name} rate")), None)
-        _set_entry(
-            point.q, point.v, p, number_of(text, m.env, f"{unit}/s" if p.rate and unit else unit, f"at[{name!r}]")
-        )
-    return closed_point(m, point, tuple(p.k for k, p in known.items() if k in at and not p.rate), at)
+        p.set(point, number_of(text, m.env, f"{unit}/s" if p.part == "v" and unit else unit, f"at[{name!r}]"))
+    return closed_point(m, point, tuple(p.k for k, p in known.items() if k in at and p.part == "q"), at)
 
 
 def closed_point(
@@ -298,7 +297,7 @@ def closed_point(
     moved = [k for k, (s, x) in enumerate(zip(m.x.q, point.q, strict=True))
              if abs(numbers[s.data.name] - nominal_value(x)) > NEW_DIRECTION * length]  # fmt: skip
     q = [numbers[m.x.q[k].data.name] if k in moved else x for k, x in enumerate(point.q)]
-    names = tuple(k for k, p in state_entries(m).items() if not p.rate and p.k in moved)
+    names = tuple(k for k, p in state_entries(m).items() if p.part == "q" and p.k in moved)
     return _with_rates(m, OperatingPoint(q, point.v, point.z, point.t, names))
 
 

@@ -16,7 +16,7 @@ from ...errors import ModelError
 from ...expression_graph.evaluation import nodes_in_order
 from ...expression_graph.graph import Graph, Node
 from ...expression_graph.printers.sympy import MAX_DENOMINATOR, SympyPrinter, fraction
-from .elimination import nominal_value
+from ..explicit.linear_systems import nominal_value
 
 MAX_TERMS_OF_ENTRY = 4000  # largest number of operations in the entries of a matrix
 # Terms with a long number below this part of the largest term of a polynomial are rounding.

@@ -1,9 +1,11 @@
 """Transfer functions whose coefficients are expressions of the parameters, by Cramer's rule without division.
 
-With the changes x(s) of positions, u = (s - N) x of velocities, l of the multipliers, w of the inputs,
+With the changes x(s) of positions, u = (s - N) x of velocities, z of the controller states, l of the multipliers, w of
+the inputs,
 
-    [(M s + D)(s - N) + K   R] [x]     [r_w]
-    [G, or G (s - N) + V    0] [l] = - [g_w, n_w] w,    y = (y_a s + y_v)(s - N) x + y_x x + y_l l + y_w w
+    [(M s + D)(s - N) + K    r_z      R] [x]     [r_w]
+    [s_u (s - N) + s_x       s_z - s  0] [z] = - [s_w] w,    y = (y_a s + y_v)(s - N) x + y_x x + y_z z + y_l l + y_w w
+    [G, or G (s - N) + V     0        0] [l]     [g_w, n_w]
 
 The transfer function is y / w = det [P b; c d] / det P. The determinant of P is the characteristic polynomial, times a
 without s.
@@ -19,16 +21,16 @@ from typing import Any
 
 import numpy as np
 
+from ...derivatives.linear_reduction import product
 from ...errors import ModelError, import_optional
 from ...expression_graph.evaluation import evaluate
 from ...expression_graph.graph import Node, zero_objects
 from ...model.messages import listing, suggest
 from ...results.wording import with_unit
 from .derivatives import Perturbed, TracedMechanism
-from .elimination import is_zero, matrix_product
 from .equilibrium import Validity
 from .polynomials import PolynomialRing, determinant
-from .reduction import Freedoms
+from .reduction import Freedoms, replaced
 
 
 @dataclass
@@ -56,85 +58,42 @@ class PolynomialPencil:
 def polynomial_pencil(m: TracedMechanism, p: Perturbed, f: Freedoms, positive: list[str]) -> PolynomialPencil:
     """Convert linear equations to polynomials, with independent constraint rows only."""
     kept = np.setdiff1d(np.arange(len(m.names)), f.held)
-    parts = _powers(p, f, kept, m)
-    ring = PolynomialRing(parts, m.model.name, positive)
+    ring = PolynomialRing(_powers(p, f, kept, m), m.model.name, positive)
     s = ring.s_element
     P, below = [], []
-    (r0, r1, r2, c0, c1, y0, y1, y2) = ring.matrices
-    whole = [
-        *(r0 + r1 * s + r2 * (s * s)),
-        *(c0 + c1 * s),
-        *(y0 + y1 * s + y2 * (s * s)),
-    ]
-    for row in whole:
+    p0, p1, p2, y0, y1, y2 = ring.matrices
+    for row in (*(p0 + p1 * s + p2 * (s * s)), *(y0 + y1 * s + y2 * (s * s))):
         common = ring.ring.one
         for x in row:
             common = common.lcm(x.denom)
         below.append(common)
         P.append(ring.cleared(list(row)))
-    n = len(r0) + len(c0)
+    n = len(p0)
     return PolynomialPencil(ring, P[:n], P[n:], below[n:], m.model.name)
 
 
 def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechanism) -> list[np.ndarray]:
-    """Coefficients of the powers of s in the equations of motion, constraints and outputs."""
-    by, k = p.by, len(m.inputs)
-    still = {s.index for s in m.added}
-
-    def at_rest(X: np.ndarray) -> np.ndarray:
-        from ...expression_graph.evaluation import substitute
-
-        out = zero_objects(*X.shape)
-        out.ravel()[:] = substitute(list(X.ravel()), [(s, 0.0) for s in m.added]) if still else list(X.ravel())
-        return out
-
-    l = f.rows_v
-
-    def second(a: np.ndarray, v: np.ndarray, x: np.ndarray, more: np.ndarray, w: np.ndarray) -> list[np.ndarray]:
-        """Coefficients of (a s + v) (s - N) + x, followed by columns of multipliers and inputs."""
-        n = len(a)
-        first = _less(v, matrix_product(a, p.N))
-        zeroth = _less(x, matrix_product(v, p.N))
-        none = zero_objects(n, len(l) + k)
-        return [
-            np.hstack(X)
-            for X in ((zeroth[:, independent], more, w), (first[:, independent], none), (a[:, independent], none))
-        ]
-
-    r = second(
-        by["ra"][independent],
-        by["rv"][independent],
-        by["rx"][independent],
-        by["rl"][np.ix_(independent, l)],
-        by["rw"][independent],
-    )
+    """Coefficients of the powers of s in all equations (of motion, of controllers, constraints) and in the outputs."""
+    by, l, nz = p.by, f.rows_v, len(m.s)
     holonomic = m.holonomic[l][:, None]
-    zeroth = _less(by["nx"][l], matrix_product(by["nv"][l], p.N))
-    none = zero_objects(len(l), len(l))
-    c0 = np.hstack(
-        [_either(holonomic, by["nv"][l], zeroth)[:, independent], none, _either(holonomic, by["gw"][l], by["nw"][l])]
-    )
-    c1 = np.hstack(
-        [
-            _either(holonomic, zero_objects(*by["nv"][l].shape), by["nv"][l])[:, independent],
-            none,
-            zero_objects(len(l), k),
-        ]
-    )
-    y = second(by["ya"], by["yv"], by["yx"], by["yl"][:, l], by["yw"])
-    return [at_rest(X) for X in (*r, c0, c1, *y)]
+    on_positions = {"v": zero_objects(*by["nv"].shape), "x": by["nv"], "w": by["gw"]}
 
+    def equations(column: str) -> np.ndarray:
+        n = np.where(holonomic, on_positions.get(column, by[f"n{column}"])[l], by[f"n{column}"][l])
+        return np.vstack([by[f"r{column}"][independent], by[f"s{column}"], n])
 
-def _either(which: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.where(which, a, b)
+    def powers(a: np.ndarray, v: np.ndarray, x: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
+        """Coefficients of (a s + v) (s - N) + x, followed by columns of states, multipliers and inputs."""
+        z, lam, w = others
+        more = np.hstack([z, lam[:, l], w])
+        first, zeroth = v - product(a, p.N), x - product(v, p.N)
+        none = zero_objects(*more.shape)
+        return [np.hstack([X[:, independent], last]) for X, last in ((zeroth, more), (first, none), (a, none))]
 
-
-def _less(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    out = A.copy()
-    for at, x in np.ndenumerate(B):
-        if not is_zero(x):
-            out[at] = out[at] - x
-    return out
+    P = powers(*map(equations, "avxzlw"))
+    rates = len(independent) + np.arange(nz)
+    P[1][rates, rates] = P[1][rates, rates] - 1.0
+    return [replaced(X, [(s, 0.0) for s in m.added]) for X in (*P, *powers(*(by[f"y{c}"] for c in "avxzlw")))]
 
 
 @dataclass
