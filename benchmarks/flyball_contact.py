@@ -12,7 +12,6 @@ import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.collision.tables import FOUND, GAP
 from flyball.simulation.impulse_stepping.setup import make_stepper, movers_of_assembly, partition_bodies
-from flyball.simulation.impulse_stepping.stepping_tables import WORST_OVERLAP
 from flyball.tables.contact_tables import contact_tables
 
 
@@ -100,7 +99,7 @@ class Run:
         return {
             "contacts": int(C.count[FOUND]),
             "overlap": float(-1e3 * np.min(C.x[: C.count[FOUND], GAP], initial=0.0)),
-            "worst": float(-1e3 * min(0.0, s.pace.real[WORST_OVERLAP])),
+            "worst": float(-1e3 * min(0.0, s.state.worst.overlap)),
             "kinetic": float(kinetic),
         }
 

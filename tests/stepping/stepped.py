@@ -16,6 +16,7 @@ from flyball.simulation.impulse_stepping.stepping_tables import (
     TASK_MEAN_VELOCITIES,
     TASK_ROWS,
     TASK_START,
+    Jobs,
 )
 from flyball.simulation.initial_state import find_initial_state
 
@@ -32,8 +33,8 @@ class Stepped:
         A = mechanism_tables(start, self.names, 0, h, stops)
         A.count.accept_unsettled = 1  # the loop's shorter steps are not here
         lines = 2 * len(A.line)
-        self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
-        n, nv = len(self.names), A.wide.shape[1]
+        self.A = A._replace(job=Jobs.blank(2 * contacts + lines))
+        n, nv = len(self.names), A.velocities.before.shape[0]
         self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
         self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
         self.P = empty_problem(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)

@@ -41,7 +41,7 @@ from ..simulation.impulse_stepping.setup import (
     values_with_stops,
 )
 from ..simulation.impulse_stepping.stepper import NoSolution, Stepper
-from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION, RESTITUTION_LAW, TIME
+from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping
 from ..tables.contact_tables import ContactTables, contact_tables
 from ..tables.structure_definition import velocity_names
@@ -102,7 +102,7 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
         held.joints.clock.y[0, : own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
     try:
         stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, held)
-        stepper.pace.count[RESTITUTION_LAW] = NO_RESTITUTION
+        stepper.state.options.restitution_law = NO_RESTITUTION
         _Settling(scene, stepper, held, h, base).walk(model.name)
     except NoSolution:
         raise AnalysisError(
@@ -163,7 +163,7 @@ class _Settling:
 
     def _step(self) -> None:
         s = self.stepper
-        s.pace.real[TIME] = self.t
+        s.state.times.now = self.t
         s.joints.real.time = self.t
         s.run(1, self.h)
 
