@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flyball.collision.tables import GAP, NORMAL, POINT, Contacts, Movers
+from flyball.collision.tables import Movers, no_contacts
 from flyball.engine.entry_point import engine
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 from flyball.simulation.impulse_stepping.mechanism_step import mechanism_kernel
@@ -36,7 +36,7 @@ class Stepped:
         self.A = A._replace(job=Jobs.blank(2 * contacts + lines))
         n, nv = len(self.names), A.velocities.before.shape[0]
         self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
-        self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
+        self.C = no_contacts(contacts)
         self.P = empty_problem(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
         self.P.group[:] = A.group
         self.X, self.Y = allocate_solver(self.P)[0], allocate_solver(self.P)[0]
@@ -79,7 +79,7 @@ class Stepped:
                 P.arm[c] = np.r_[
                     [np.subtract(point, self.M.pose[k, :3]) if k >= 0 else np.zeros(3) for k in (a, b)]
                 ].ravel()
-                self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
+                self.C.x.point[c], self.C.x.normal[c], self.C.x.gap[c] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
             X.line[:] = 0.0
             self.ask(TASK_FREE_VELOCITIES)

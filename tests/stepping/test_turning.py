@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.collision.tables import BEFORE, FOUND, Contacts
+from flyball.collision.tables import no_contacts
 from flyball.numerics.complementarity.contact_operator import to_world_frame
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 from flyball.simulation.impulse_stepping.contact_constraints import account_contact, account_rolling, warm_start
@@ -98,8 +98,8 @@ def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> 
     E.p[:], E.torque[:] = more[:, :3], more[:, 3:]
     X.v[:, :6] = (first + DK.T @ lost).reshape(nodes, 6)
     E.v[:, :6] = X.v[:, :6] + (DK.T @ more.ravel()).reshape(nodes, 6)
-    C = Contacts(np.zeros(8, np.int64), np.zeros((nc, 4), np.int64), np.zeros((nc, 8)))
-    C.count[FOUND] = nc
+    C = no_contacts(nc)
+    C.count.found = nc
     assert kinetic(X.v[:, :6].ravel()) < kinetic(first) < kinetic(E.v[:, :6].ravel())
     add_expansion(P, np.zeros((nc, 3)), Z, E, X, C, state, now)
     assert kinetic(X.v[:, :6].ravel()) == pytest.approx(kinetic(first), rel=1e-12)
@@ -137,12 +137,12 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     for c in range(n):
         account_contact(P, X, c, (0.0, 0.0, 0.0), state, before)
         account_rolling(P, X, Y, c, state, before)
-    C = Contacts(np.zeros(8, np.int64), np.zeros((n, 4), np.int64), np.zeros((n, 8)))
-    C.count[FOUND], C.at[:, BEFORE] = n, (3, 0, -1, 4, 1)
-    normal = normal[C.at[:, BEFORE]]
+    C = no_contacts(n)
+    C.count.found, C.at.before[:] = n, (3, 0, -1, 4, 1)
+    normal = normal[C.at.before[:]]
     tangents()
     warm_start(C, P, X, now, before)
-    old = C.at[:, BEFORE] >= 0
-    assert world()[:, old] == pytest.approx(was[:, C.at[old, BEFORE]], abs=1e-14)
+    old = C.at.before[:] >= 0
+    assert world()[:, old] == pytest.approx(was[:, C.at.before[old]], abs=1e-14)
     assert not X.p[~old].any()
     assert not X.torque[~old].any()

@@ -243,17 +243,17 @@ def _register_arrays(types: Any) -> None:
 
         def __init__(self, named: Array | RecordLayout) -> None:
             layout = named.array if isinstance(named, RecordLayout) else named
-            self.entries = named.of.form.entries if isinstance(named, RecordLayout) else {}
+            self.entries = named.of.layout.entries if isinstance(named, RecordLayout) else {}
             self.layout, self.part = named, None
             self.array = types.Array(from_dtype(dtype(layout.dtype)), layout.ndim, "C")
             self.dtype, self.ndim = self.array.dtype, layout.ndim
             super().__init__(name=f"Array_{named}")
 
         def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-            return Conversion.safe if other == self.array else None
+            return Conversion.safe if other == self.array and self.part is None else None
 
         def unify(self, typingctx: Any, other: Any) -> Any:
-            return self.array if other == self.array else None
+            return self.array if other == self.array and self.part is None else None
 
     _REFERENCE_TYPES["array"] = Reference
 
@@ -263,16 +263,10 @@ def _register_arrays(types: Any) -> None:
         def __init__(self, record: Any, name: str) -> None:
             (first, count), ndim = record.entries[name], record.ndim
             self.layout, self.entries = (record.layout, name), {}
-            self.part = _Part(first, count, record.layout.of.form.width if ndim == 2 else 0)
+            self.part = _Part(first, count, record.layout.of.layout.width if ndim == 2 else 0)
             self.array = types.Array(record.dtype, ndim if count > 1 else 1, "C")
             self.dtype, self.ndim = record.dtype, self.array.ndim
             types.Type.__init__(self, name=f"{record.name}.{name}")
-
-        def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-            return None
-
-        def unify(self, typingctx: Any, other: Any) -> Any:
-            return None
 
     @register_model(Reference)
     @register_model(PartReference)

@@ -69,7 +69,7 @@ class RecordLayout(NamedTuple):
         return self.array.size
 
     def __str__(self) -> str:
-        names = ",".join(k if n == 1 else f"{k}*{n}" for k, (_, n) in self.of.form.entries.items())
+        names = ",".join(k if n == 1 else f"{k}*{n}" for k, (_, n) in self.of.layout.entries.items())
         return f"{self.of.__name__}({names}):{self.array}"
 
 
@@ -90,7 +90,7 @@ class Record(np.ndarray):
     each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``.
     """
 
-    form: ClassVar[RecordForm]
+    layout: ClassVar[RecordForm]
 
     def __init_subclass__(cls, kind: str, rows: bool = False) -> None:
         entries, width = dict[str, tuple[int, int]](), 0
@@ -101,13 +101,13 @@ class Record(np.ndarray):
             first, count = entries[name] = width, int(several[1]) if several else 1
             width += count
             setattr(cls, name, _entry_property(first, count, rows))
-        cls.form = RecordForm(entries, width, kind, rows)
+        cls.layout = RecordForm(entries, width, kind, rows)
 
     @classmethod
     def blank(cls, *count: int) -> Any:
         """Record of zeros; of so many rows."""
-        dtype: type = {"Int": np.int64, "Short": np.int32}.get(cls.form.kind, np.float64)
-        return np.zeros((*count, cls.form.width), dtype).view(cls)
+        dtype: type = {"Int": np.int64, "Short": np.int32}.get(cls.layout.kind, np.float64)
+        return np.zeros((*count, cls.layout.width), dtype).view(cls)
 
 
 def _entry_property(first: int, count: int, rows: bool) -> property:
@@ -205,7 +205,7 @@ def _declared_layout(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
         return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
     made = scope[text]
     if isinstance(made, type) and issubclass(made, Record):
-        return RecordLayout(_declared_layout(f"{made.form.kind}{1 + made.form.rows}", scope, is_complex), made)
+        return RecordLayout(_declared_layout(f"{made.layout.kind}{1 + made.layout.rows}", scope, is_complex), made)
     if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
         return struct_layout(made.__origin__, COMPLEX in made.__metadata__)
     return struct_layout(made, is_complex)

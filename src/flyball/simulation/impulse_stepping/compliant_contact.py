@@ -15,7 +15,6 @@ to rows u + bias + soft p >= 0. Displacements end at the overlaps b.
 from __future__ import annotations
 
 from ...collision.shape_kinds import SPHERE
-from ...collision.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...numerics.complementarity.contact_operator import contact_velocity, diagonal_block
@@ -34,7 +33,7 @@ RESOLVED_STIFFNESS = 0.01  # largest h^2 k' / 4 m that resolves an impact: 20 st
 @formula
 def contact_law(G, C, L, c):
     """Return exponent, dissipation, damping, stiffness and modulus of contact c."""
-    a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
+    a, b = G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]]
     return (
         L.pair[a, b, EXPONENT],
         L.pair[a, b, DISSIPATION],
@@ -50,10 +49,9 @@ def contact_stiffness(G, C, L, c):
     _, _, _, k, modulus = contact_law(G, C, L, c)
     if modulus > 0.0:
         s = 0.0
-        for side in (SHAPE_1, SHAPE_2):
-            i = C.at[c, side]
-            if G.shape_i[i, KIND] == SPHERE:
-                s += 1.0 / G.shape_x[i, PAR]
+        for i in (C.at.shape_1[c], C.at.shape_2[c]):
+            if G.shape.kind[i] == SPHERE:
+                s += 1.0 / G.dimensions.par[i, 0]
         return modulus / sqrt(s)
     return k
 
@@ -109,12 +107,12 @@ def find_compliant_contacts(G, C, P, L, X, state, now, before):
     """Store the data of compliant contacts at the start of the step. Returns whether there are any."""
     any_ = False
     gone = state.sums.elastic_energy
-    for c in range(C.count[FOUND]):
-        k, o = contact_stiffness(G, C, L, c), C.at[c, BEFORE]
+    for c in range(C.count.found):
+        k, o = contact_stiffness(G, C, L, c), C.at.before[c]
         now.stiffness[c] = k
         if k > 0.0:
             any_ = True
-            now.overlap[c] = now.law_overlap[c] = now.spring_overlap[c] = -C.x[c, GAP]
+            now.overlap[c] = now.law_overlap[c] = now.spring_overlap[c] = -C.x.gap[c]
             now.overlap_rate[c] = contact_velocity(P, X.v, X.wide, c)[0]
             if o >= 0:
                 now.law_overlap[c], now.spring_overlap[c] = (
@@ -127,8 +125,8 @@ def find_compliant_contacts(G, C, P, L, X, state, now, before):
     state.sums.numerical_loss += gone
     if state.counts.steps_taken == 0:
         state.sums.elastic_at_start = 0.0
-        for c in range(C.count[FOUND]):
-            state.sums.elastic_at_start += elastic_energy(now.stiffness[c], contact_law(G, C, L, c)[0], -C.x[c, GAP])
+        for c in range(C.count.found):
+            state.sums.elastic_at_start += elastic_energy(now.stiffness[c], contact_law(G, C, L, c)[0], -C.x.gap[c])
     return any_
 
 
@@ -155,7 +153,7 @@ def start_overlap(now, c, k, n, new):
 @formula
 def expected_speed(C, now, before, c, state):
     """Return the normal speed of contact c plus its expected change in the step, as in the step before."""
-    o = C.at[c, BEFORE]
+    o = C.at.before[c]
     change = now.overlap_rate[c] - before.overlap_rate[o] if o >= 0 and before.stiffness[o] > 0.0 else 0.0
     part = state.times.step / state.times.last_step if state.times.last_step > 0.0 else 0.0
     return abs(now.overlap_rate[c]) + part * abs(change)
@@ -170,7 +168,7 @@ def start_compliant_rows(G, C, P, L, X, state, now, before):
     """
     h, too_long = state.times.step, False
     slow = rest_speed(state, state.times.longest_step)
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         k = now.stiffness[c]
         if k > 0.0:
             n = contact_law(G, C, L, c)[0]
@@ -180,7 +178,7 @@ def start_compliant_rows(G, C, P, L, X, state, now, before):
             s = now.implicit_share[c] = z * z / (1.0 + z * z)
             too_long = too_long or (z > RESOLVED_STIFFNESS and expected_speed(C, now, before, c, state) > slow)
             if state.counts.steps_taken > 0:
-                state.sums.numerical_loss -= start_overlap(now, c, k, n, C.at[c, BEFORE] < 0)
+                state.sums.numerical_loss -= start_overlap(now, c, k, n, C.at.before[c] < 0)
             if now.law_overlap[c] > 0.0:
                 u = (now.overlap[c] - now.law_overlap[c] - 0.5 * h * (1.0 - s) * now.overlap_rate[c]) / (
                     0.5 * h * (1.0 + s)
@@ -206,7 +204,7 @@ def tangent_row(G, C, P, L, state, now, c, u):
 def linearise_compliant_rows(G, C, P, L, X, state, now):
     """Linearise compliant rows at the velocities of ``X``; return the largest error of the previous rows [m/s]."""
     worst = 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         if now.stiffness[c] > 0.0:
             u = contact_velocity(P, X.v, X.wide, c)[0]
             row = -(u + P.bias[c, 0]) / P.soft[c] if P.soft[c] > 0.0 else 0.0
@@ -253,7 +251,7 @@ def store_elastic_energy(G, C, P, L, X, Y, state, now):
     """Update the elastic energy of contacts at the end of the step, and the energy dissipated or lost numerically."""
     h = state.times.step
     state.sums.elastic_energy = 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         if now.stiffness[c] > 0.0:
             k, n = now.stiffness[c], contact_law(G, C, L, c)[0]
             overlap = -now.end_gap[c] - h * contact_velocity(P, Y.v, Y.wide, c)[0]

@@ -14,7 +14,6 @@ the change of its rows. The same holds along the tangents of sliding contacts an
 
 from __future__ import annotations
 
-from ...collision.tables import APART, BEFORE, FEATURE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ...compiler.formulas import formula
 from ...math.scalar import cos, sin, sqrt
 from ...math.vec import (
@@ -53,20 +52,20 @@ from .stepping_tables import (
 def fill_rows(G, M, C, P, L, state):
     """Fill the contact problem except impulses and masses; its sizes too."""
     h = state.times.step
-    P.size[0] = C.count[FOUND]
-    P.island[0], P.island[1] = 0, C.count[FOUND]
+    P.size[0] = C.count.found
+    P.island[0], P.island[1] = 0, C.count.found
     turns = P.turn.shape[0] > 0
-    for c in range(C.count[FOUND]):
-        i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+    for c in range(C.count.found):
+        i, j = C.at.shape_1[c], C.at.shape_2[c]
         a, b = P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
-        point = load3(C.x, c, POINT)
-        store3(P.frame, c, 0, load3(C.x, c, NORMAL))
-        apart = load3(C.x, c, APART)
+        point = load3(C.x.point, c, 0)
+        store3(P.frame, c, 0, load3(C.x.normal, c, 0))
+        apart = load3(C.x.apart, c, 0)
         store3(P.arm, c, 0, arm_to(M, a, sub(point, apart)))
         store3(P.arm, c, 3, arm_to(M, b, add(point, apart)))
-        law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+        law = L.pair[G.shape.material[i], G.shape.material[j]]
         fill_tangents(G, M, C, P, L, c)
-        gap = C.x[c, GAP]
+        gap = C.x.gap[c]
         P.bias[c, 0] = gap / h if gap > 0.0 else 0.0
         P.mu[c] = law[KINETIC]
         P.soft[c] = 0.0
@@ -77,7 +76,7 @@ def fill_rows(G, M, C, P, L, state):
 @formula
 def movers_of_contact(G, C, c):
     """Return the movers of contact c."""
-    return G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+    return G.shape.mover[C.at.shape_1[c]], G.shape.mover[C.at.shape_2[c]]
 
 
 @formula
@@ -89,9 +88,9 @@ def arm_to(M, a, point):
 @formula
 def fill_tangents(G, M, C, P, L, c):
     """Set the tangents of contact c, and the velocities of moving surfaces along them."""
-    i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
-    a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
-    law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+    i, j = C.at.shape_1[c], C.at.shape_2[c]
+    a, b = G.shape.mover[i], G.shape.mover[j]
+    law = L.pair[G.shape.material[i], G.shape.material[j]]
     tangent, square = tangent_direction(M, L, (i, a), (j, b), load3(P.frame, c, 0))
     write_tangents(P.frame, c, tangent, law[ACROSS] if square else 1.0, law[ACROSS])
     P.bias[c, 1] = P.bias[c, 2] = 0.0
@@ -142,8 +141,8 @@ def add_surface_velocity(M, L, P, c, shape, mover, sign):
 @formula
 def warm_start(C, P, X, now, before):
     """Start from the impulses of the same contacts in the step before; note which contacts stuck."""
-    for c in range(C.count[FOUND]):
-        o = C.at[c, BEFORE]
+    for c in range(C.count.found):
+        o = C.at.before[c]
         now.sliding[c] = before.sliding[o] if o >= 0 else -1.0
         store3(X.p, c, 0, previous_impulse(P, c, before.impulse, o))
         if X.torque.shape[0] > 0:
@@ -173,8 +172,8 @@ def projection_coefficient(x, row):
 def static_friction_of_sticking(G, C, P, L, X, state, now):
     """Set the static coefficient for contacts that stuck before, and for new ones that hardly slide."""
     slow = speed_of_fall(state, state.times.step)
-    for c in range(C.count[FOUND]):
-        law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
+    for c in range(C.count.found):
+        law = L.pair[G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]]]
         if law[STATIC] > law[KINETIC] and now.sliding[c] < 0.5:
             u = contact_velocity(P, X.v, X.wide, c)
             s, t = u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
@@ -194,7 +193,7 @@ NO_ARM = 1e-10  # negligible part of an arm across the normal, as for spheres
 @formula
 def side_of_contact(P, M, G, C, c, side):
     """Return the mover on a side of contact c, its arm, and the part of the arm across the normal (0 if negligible)."""
-    a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+    a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
     n, r = load3(P.frame, c, 0), load3(P.arm, c, 3 * side)
     s = sub(r, scale(dot(r, n), n))
     if dot(s, s) <= NO_ARM * NO_ARM * dot(r, r):
@@ -214,7 +213,7 @@ def rows_change(G, M, C, D, P, c, h):
     """Return whether the rows of contact c change within the step, by rotation of normals or of bodies with transverse
     arms.
     """
-    change = norm(sub(load3(C.x, c, NORMAL), load3(D.x, C.at[c, BEFORE], NORMAL)))
+    change = norm(sub(load3(C.x.normal, c, 0), load3(D.x.normal, C.at.before[c], 0)))
     for side in range(2):
         a, _, s = side_of_contact(P, M, G, C, c, side)
         if a >= 0 and dot(s, s) > 0.0:
@@ -255,7 +254,7 @@ def start_velocity(G, C, N, P, X, c):
     """Return the relative velocity of contact c at the start of the step, in world axes."""
     u = (0.0, 0.0, 0.0)
     for side in range(2):
-        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
         if a >= 0:
             v, w = start_twist(N, X, a)
             u = add(u, scale(2.0 * side - 1.0, add(v, cross(w, load3(P.arm, c, 3 * side)))))
@@ -275,7 +274,7 @@ def speed_is_clear(G, C, N, P, X, c, state):
     """Return whether the bodies' speeds at contact c exceed the residual of the last solve."""
     fast, way = 0.0, (0.0, 0.0, 0.0)
     for side in range(2):
-        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
         if a >= 0:
             v, w = start_twist(N, X, a)
             fast += norm(cross(w, load3(P.arm, c, 3 * side)))
@@ -307,15 +306,15 @@ def find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, impacts
     """
     h, wanted = state.times.step, False
     slow = rest_speed(state, h)
-    for c in range(C.count[FOUND]):
-        o, u = C.at[c, BEFORE], start_velocity(G, C, N, P, X, c)
+    for c in range(C.count.found):
+        o, u = C.at.before[c], start_velocity(G, C, N, P, X, c)
         store3(now.middle_bias, c, 0, (0.0, 0.0, 0.0))
         store3(now.start_velocity, c, 0, u)
         now.persistence[c] = 0.0
         if o < 0 or not before.sliding[o] >= 0.0:
             continue
         soft = state.options.compliant != 0 and contact_stiffness(G, C, L, c) > 0.0
-        closing = -dot(load3(C.x, c, NORMAL), u)
+        closing = -dot(load3(C.x.normal, c, 0), u)
         if soft or closing <= state.tolerances.velocity:
             now.persistence[c] = PRESSES
         steady = (
@@ -351,11 +350,11 @@ def restore_poses(N, M):
 def middle_rows(G, M, C, H, P, L, now):
     """Set the rows of persistent contacts from poses and contacts ``H`` in the middle; return whether there are any."""
     found = False
-    for k in range(H.count[FOUND]):
-        c = H.at[k, BEFORE]
-        if c < 0 or now.persistence[c] != MIDDLE_WANTED or C.at[c, FEATURE] != H.at[k, FEATURE]:
+    for k in range(H.count.found):
+        c = H.at.before[k]
+        if c < 0 or now.persistence[c] != MIDDLE_WANTED or C.at.feature[c] != H.at.feature[k]:
             continue
-        n, point = load3(H.x, k, NORMAL), load3(H.x, k, POINT)
+        n, point = load3(H.x.normal, k, 0), load3(H.x.point, k, 0)
         a, b = movers_of_contact(G, C, c)
         r, s = arm_to(M, a, point), arm_to(M, b, point)
         if dot(n, load3(P.frame, c, 0)) < SAME_NORMAL or contact_jumps(M, P, c, (a, b), (r, s)):
@@ -374,7 +373,7 @@ def middle_rows(G, M, C, H, P, L, now):
 @formula
 def bias_persistent_contacts(G, M, C, P, X, now, before):
     """Set the biases of contacts with rows in the middle of the step; see the module docstring."""
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         if now.persistence[c] != MIDDLE_FOUND:
             continue
         u = contact_velocity(P, X.v, X.wide, c)
@@ -386,7 +385,7 @@ def bias_persistent_contacts(G, M, C, P, X, now, before):
             s, t = more[1], more[2]
             own = P.bias[c, 1], P.bias[c, 2]
             a, b = first[1] + own[0], first[2] + own[1]
-            if before.sliding[C.at[c, BEFORE]] == 0.0 and a * a + b * b <= s * s + t * t:
+            if before.sliding[C.at.before[c]] == 0.0 and a * a + b * b <= s * s + t * t:
                 s, t = u[1] + own[0], u[2] + own[1]
             ahead = (ahead[0], s, t)
         store3(now.middle_bias, c, 0, ahead)

@@ -14,7 +14,6 @@ import numpy as np
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ...assembly.positions_and_velocities import described_velocities
-from ...collision.tables import FOUND, GAP, MOVER, SHAPE_1, SHAPE_2
 from ...compiler.object_code import compiled_since
 from ...errors import AnalysisError, SimulationError
 from ...math.vec import mtv, quaternion_matrix
@@ -115,17 +114,17 @@ class OutputRecorder:
         """
         s = self.stepper
         C, kept = s.last()
-        n = int(C.count[FOUND])
+        n = int(C.count.found)
         impulse = kept.impulse[:n] + kept.impact_impulse[:n]
         k = np.flatnonzero((impulse != 0.0).any(axis=1))
-        mover = s.geometry.shape_i[C.at[k][:, [SHAPE_1, SHAPE_2]], MOVER]
+        mover = s.geometry.shape.mover[C.at[k, :2]]
         moving = (mover >= 0)[:, :, None]
         points = np.where(moving, s.free.start[mover, :3] + s.workspaces.P.arm[k].reshape(-1, 2, 3), 0.0)
         return {
             "pair": self.side_of[mover],
             "point": points.sum(axis=1) / np.maximum(moving.sum(axis=1), 1),
             "normal": s.workspaces.P.frame[k, :3].copy(),
-            "gap": C.x[k, GAP],
+            "gap": C.x.gap[k],
             "force": impulse[k] / s.state.times.step,
             "state": np.where(kept.sliding[k] > 0.5, SLIP, np.where(kept.sliding[k] < -0.5, OPEN, STICK)),
             "friction": s.workspaces.P.mu[k],

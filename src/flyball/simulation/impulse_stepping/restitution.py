@@ -16,7 +16,6 @@ none closes.
 
 from __future__ import annotations
 
-from ...collision.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ...compiler.formulas import call, formula
 from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, scale, store3, sub
@@ -48,7 +47,7 @@ def sequential_impacts(R, Z, X, C, state, now):
 
     ``R.least`` holds their restitutions. Contacts that close within the step because of other impacts have one too.
     """
-    n = C.count[FOUND]
+    n = C.count.found
     for c in range(n):
         for i in range(3):
             Z.p[c, i] = 0.0
@@ -61,7 +60,7 @@ def sequential_impacts(R, Z, X, C, state, now):
         for c in range(n):
             if now.hit[c] > 0.0 or R.least[c] > 0.0:
                 u = contact_velocity(R, X.v, X.wide, c)
-                there = now.hit[c] > 0.0 or C.x[c, GAP] + state.times.step * u[0] <= state.tolerances.overlap
+                there = now.hit[c] > 0.0 or C.x.gap[c] + state.times.step * u[0] <= state.tolerances.overlap
                 if there and -u[0] > most:
                     first, most = c, -u[0]
         if first < 0:
@@ -147,7 +146,7 @@ ITERATION_FACTOR = 4  # iterations relative to those of velocity solves, which a
 @formula
 def restitution_of(G, C, L, c):
     """Return the coefficient of restitution of contact c."""
-    return L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL], RESTITUTION]
+    return L.pair[G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]], RESTITUTION]
 
 
 @formula
@@ -158,7 +157,7 @@ def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now):
     velocities with ``X``, ``E`` that of expansion.
     """
     if state.options.sequential != 0:
-        for c in range(C.count[FOUND]):
+        for c in range(C.count.found):
             R.least[c] = restitution_of(G, C, L, c)
         if not sequential_impacts(R, Z, X, C, state, now):
             state.counts.reduced_expansions += 1
@@ -172,7 +171,7 @@ def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now):
 @formula
 def clear_impact_impulses(C, now):
     """Clear the impact impulses of the step."""
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         for i in range(3):
             now.impact_impulse[c, i] = 0.0
 
@@ -181,7 +180,7 @@ def clear_impact_impulses(C, now):
 def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now):
     """Apply Poisson's law: an inelastic impact, then expansion."""
     solve_from_zero(state.addresses.impacts, R, Z, W, O, F, state)
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         R.least[c] = restitution_of(G, C, L, c) * Z.p[c, 0] if now.hit[c] > 0.0 else 0.0
     copy_velocities(X, E)
     solve_from_zero(state.addresses.impacts, R, E, W, O, F, state)
@@ -195,14 +194,14 @@ def newton_impacts(C, bias, R, Z, E, X, W, O, F, state, now):
     solve_from_zero(state.addresses.impacts, R, E, W, O, F, state)
     if impulse_energy(R, bias, E, E, C, now) <= 0.0:
         copy_velocities(E, X)
-        for c in range(C.count[FOUND]):
+        for c in range(C.count.found):
             add_impulses(Z, 0.0, E, 1.0, c)
         return
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         for i in range(3):
             R.bias[c, i] = 0.0 if i == 0 and now.hit[c] > 0.0 else bias[c, i]
     solve_from_zero(state.addresses.impacts, R, Z, W, O, F, state)
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         add_impulses(E, 1.0, Z, -1.0, c)
     add_expansion(R, bias, Z, E, X, C, state, now)
 
@@ -234,7 +233,7 @@ def find_impacts(G, C, at, bias, R, X, L, state, now):
     slowest = rest_speed(state, h)
     found = False
     law = state.options.restitution_law
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         R.least[c] = 0.0
         gives_way = state.options.compliant != 0 and contact_stiffness(G, C, L, c) > 0.0
         for i in range(2):  # compliant contacts have no instantaneous impulse
@@ -246,11 +245,11 @@ def find_impacts(G, C, at, bias, R, X, L, state, now):
             store3(now.impact_spin, c, 0, contact_angular_velocity(R, X.v, X.wide, c))
         e = restitution_of(G, C, L, c)
         now.hit[c] = 0.0
-        plain = state.options.sequential != 0 and C.x[c, GAP] <= state.tolerances.overlap
+        plain = state.options.sequential != 0 and C.x.gap[c] <= state.tolerances.overlap
         if gives_way:
             R.bias[c, 0] = 0.0
             continue
-        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[
+        if (e > 0.0 or plain) and C.x.gap[c] + h * u[
             0
         ] <= state.tolerances.overlap:  # also contacts resting against a body that has an impact
             now.hit[c] = 1.0
@@ -260,7 +259,7 @@ def find_impacts(G, C, at, bias, R, X, L, state, now):
                 R.bias[c, 0] = e * u[0]
                 for i in range(1, 3 if law == MOREAU else 1):
                     R.bias[c, i] += e * u[i]
-        elif C.x[c, GAP] > NEAR_GAPS * state.tolerances.overlap:
+        elif C.x.gap[c] > NEAR_GAPS * state.tolerances.overlap:
             for i in range(2):  # it cannot close during an impact, which takes no time: it is left to the next round
                 R.at[c, i] = FIXED_SIDE
     return found
@@ -291,7 +290,7 @@ def impulse_energy(R, bias, Z, X, C, now):
     It includes moving surfaces (``bias`` along the tangents), which may supply energy.
     """
     total = 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         for i in range(3):
             own = bias[c, i] if i > 0 else 0.0
@@ -319,7 +318,7 @@ def add_expansion(R, bias, Z, E, X, C, state, now):
     """
     there = max(0.0, -impulse_energy(R, bias, Z, X, C, now))
     a, b = 0.0, 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         w = contact_velocity(R, E.v, E.wide, c)
         for i in range(3):
@@ -344,14 +343,14 @@ def add_expansion(R, bias, Z, E, X, C, state, now):
             X.v[k, i] += s * (E.v[k, i] - X.v[k, i])
     for k in range(X.wide.shape[0]):
         X.wide[k] += s * (E.wide[k] - X.wide[k])
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         add_impulses(Z, 1.0, E, s, c)
 
 
 @formula
 def account_impacts(R, bias, Z, X, C, state, now):
     """Store the impulses of the impacts, and account for the energy lost."""
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         worn = -torque_impulse_energy(R, Z, X, c, now)
         for i in range(3):

@@ -10,7 +10,7 @@ import numpy as np
 from ...assembly.assemble import assemble
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import compile_mechanism
-from ...collision.tables import RADIUS, Movers
+from ...collision.tables import Movers
 from ...engine.calls import OutputBuffer
 from ...engine.residual import DIRECTIONS, SLOPE_WIDTH
 from ...engine.stabilization import STEPS
@@ -161,7 +161,7 @@ def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tup
         line.append((kind, S.forces.F[k], k))
         laws.append(law)
     return (
-        np.array(line, np.int64).reshape(-1, SingleRows.form.width).view(SingleRows),
+        np.array(line, np.int64).reshape(-1, SingleRows.layout.width).view(SingleRows),
         np.concatenate([SingleRowLaws.blank(0), *laws]).view(SingleRowLaws),
     )
 
@@ -419,7 +419,7 @@ OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 1
 
 def smallest_radius(scene: ContactTables, values: Values) -> float:
     """Return the radius [m] of the smallest shape; the mechanism's length if all are unbounded."""
-    sizes = scene.geometry.shape_x[:, RADIUS]
+    sizes = scene.geometry.dimensions.radius[:]
     bounded = sizes[np.isfinite(sizes)]
     return float(bounded.min() if len(bounded) else values.length)
 

@@ -14,18 +14,8 @@ from ...collision.broad_phase.workspace import Search
 from ...collision.contact_search import MIDWAY, NEW_VELOCITIES
 from ...collision.contact_search import STEP as STEP_ON
 from ...collision.tables import (
-    AHEAD,
-    BEFORE,
     DONE,
-    FOUND,
     FULL_CONTACTS,
-    GAP,
-    MOVER,
-    NORMAL,
-    NUMBER,
-    POINT,
-    SHAPE_1,
-    SHAPE_2,
     Contacts,
     Geometry,
     Movers,
@@ -147,7 +137,7 @@ def shift_by_joints(A, M, mover, axis, arm):
 def change_of_gap(G, A, M, C, P, c):
     """Return the change of the gap of contact c by the projection onto the joints."""
     n = load3(P.frame, c, 0)
-    a, b = G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+    a, b = G.shape.mover[C.at.shape_1[c]], G.shape.mover[C.at.shape_2[c]]
     return shift_by_joints(A, M, b, n, load3(P.arm, c, 3)) - shift_by_joints(A, M, a, n, load3(P.arm, c, 0))
 
 
@@ -160,15 +150,15 @@ def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, state):
     if not A.real.kinetic >= 0.0:
         return False
     h, worst = state.times.step, 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         change = change_of_gap(G, A, M, C, P, c)
         if change != 0.0:
             worst = min(worst, h * (aim[c, 0] + contact_velocity(P, Y.v, Y.wide, c)[0]) + change)
     if worst >= -OVERLAP_FACTOR * state.tolerances.overlap:
         return False
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         Q.bias[c, 0] = aim[c, 0] + change_of_gap(G, A, M, C, P, c) / h
-    Q.size[0] = C.count[FOUND]
+    Q.size[0] = C.count.found
     return True
 
 
@@ -261,13 +251,13 @@ def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now):
     mean_velocities(N, X, Y)
     call_mechanism(A, M, C, P, Y, state, TASK_MEAN_VELOCITIES)
     deepest = A.real.overrun if state.addresses.mechanism != 0 else 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(P, Y.v, Y.wide, c)
-        gap = C.x[c, GAP] + h * u[0]
+        gap = C.x.gap[c] + h * u[0]
         if now.stiffness[c] > 0.0:
             gap = remaining_gap(now, c, gap)
         else:
-            state.worst.overlap = min(state.worst.overlap, C.x[c, GAP])
+            state.worst.overlap = min(state.worst.overlap, C.x.gap[c])
         deepest = min(deepest, -abs(gap) if now.persistence[c] == MIDDLE_FOUND else gap)
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
         account_contact(P, X, c, u, state, now)
@@ -280,7 +270,7 @@ def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now):
     clear_velocities(Y)
     if deepest < -state.tolerances.overlap:
         preload_displacements(C, P, X, Y, now)
-        Q.size[0] = C.count[FOUND]
+        Q.size[0] = C.count.found
         solve_cone_problem(
             state.addresses.positions,
             Q,
@@ -301,7 +291,7 @@ def preload_displacements(C, P, X, Y, now):
     """Start displacements of persistent contacts from their impulses, so that gaps close as far as these contacts
     press.
     """
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         if now.persistence[c] == MIDDLE_FOUND:
             apply_contact_impulse(P, Y.v, Y.wide, c, (-X.p[c, 0], 0.0, 0.0))
             Y.p[c, 0] = X.p[c, 0]
@@ -368,40 +358,40 @@ def search_again(G, M, C, H, B, Z, state, now):
     did.
     """
     status, most = call(state.addresses.search, G, M, H, C, B, NEW_VELOCITIES), H.at.shape[0]
-    n = H.count[FOUND]
+    n = H.count.found
     if status != DONE:
-        C.count[FOUND] = n
+        C.count.found = n
         return status
-    C.count[NUMBER] = H.count[NUMBER]
+    C.count.number = H.count.number
     for k in range(n):
-        o = H.at[k, BEFORE]
+        o = H.at.before[k]
         same = o >= 0 and not (had_impact(now, o) and contact_moved(C, o, H, k))
         store3(Z.p, k, 0, load3(now.impact_impulse, o, 0) if same else (0.0, 0.0, 0.0))
         if same:
             now.hit[o] = -1.0
         if o >= 0:
-            H.at[k, BEFORE] = C.at[o, BEFORE]
-    for o in range(C.count[FOUND]):
+            H.at.before[k] = C.at.before[o]
+    for o in range(C.count.found):
         if had_impact(now, o) and now.hit[o] >= 0.0:
             if n < most:
                 store3(Z.p, n, 0, load3(now.impact_impulse, o, 0))
                 copy_contact(C, o, H, n)
-                H.at[n, BEFORE] = -1
+                H.at.before[n] = -1
             n += 1
     if n > most:
-        C.count[FOUND] = n
+        C.count.found = n
         return FULL_CONTACTS
     for k in range(n):
         copy_contact(H, k, C, k)
         store3(now.impact_impulse, k, 0, load3(Z.p, k, 0))
-    C.count[FOUND] = n
+    C.count.found = n
     return DONE
 
 
 @formula
 def contact_moved(C, o, H, k):
     """Return whether contact k of H has another normal or point than contact o of C."""
-    return load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL) or load3(C.x, o, POINT) != load3(H.x, k, POINT)
+    return load3(C.x.normal, o, 0) != load3(H.x.normal, k, 0) or load3(C.x.point, o, 0) != load3(H.x.point, k, 0)
 
 
 @formula
@@ -451,10 +441,10 @@ def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, state, now, before, hit):
     found = status == DONE and middle_rows(G, M, C, H, P, L, now)
     restore_poses(N, M)
     if status != DONE:
-        C.count[FOUND] = H.count[FOUND]
+        C.count.found = H.count.found
         return status
     if found:
-        for c in range(C.count[FOUND]):
+        for c in range(C.count.found):
             P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
         call_mechanism(A, M, C, P, X, state, TASK_ROWS)
         bias_persistent_contacts(G, M, C, P, X, now, before)
@@ -477,7 +467,7 @@ def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state,
     """Compute impacts, velocities and displacements for `take_step`. Returns a status."""
     if free_velocities_of_all(A, M, C, P, X, N, state) != DONE:
         return NO_SOLUTION
-    B.real[AHEAD] = state.times.step
+    B.real.ahead = state.times.step
     status = call(state.addresses.search, G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
@@ -505,7 +495,7 @@ def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state,
     state.times.last_step = state.times.step
     state.counts.steps_taken += 1
     state.counts.steps_left -= 1
-    state.counts.most_contacts = max(state.counts.most_contacts, C.count[FOUND])
+    state.counts.most_contacts = max(state.counts.most_contacts, C.count.found)
     return DONE
 
 
