@@ -259,7 +259,7 @@ LENS = '''"""Two caps of a sphere, base to base: what is within the radius of bo
 
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
-from ..tables import PAR
+
 
 KIND = 12
 

@@ -49,15 +49,15 @@ class Stepped:
 
     @property
     def q(self):
-        return self.A.clock.y[0, : self.structure.nq]
+        return self.A.clock.y.current[: self.structure.nq]
 
     @property
     def v(self):
-        return self.A.clock.y[0, self.structure.nq : self.structure.nq + self.structure.nv]
+        return self.A.clock.y.current[self.structure.nq : self.structure.nq + self.structure.nv]
 
     @property
     def z(self):
-        return self.A.clock.y[0, self.structure.nq + self.structure.nv :]
+        return self.A.clock.y.current[self.structure.nq + self.structure.nv :]
 
     def pose(self, name):
         """Mass centre, axes."""

@@ -383,7 +383,7 @@ def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tup
         If it is not of that type.
     """
     if isinstance(of, RecordLayout):
-        if x.shape[-1:] != (of.of.layout.width,):
+        if x.shape[0] < of.of.layout.width if of.of.layout.vectors else x.shape[-1] != of.of.layout.width:
             raise TypeError(f"{name}: {of.of.layout.width} numbers are needed for {of}, got {x.shape}")
         of = of.array
     if x.ndim != of.ndim or x.dtype != of.dtype or x.flags.num & _ORDER != _ORDER:

@@ -293,6 +293,8 @@ def _register_arrays(types: Any) -> None:
         def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
             if attr not in typ.entries:
                 return None
+            if typ.layout.of.layout.vectors:
+                return types.Array(typ.dtype, 1, "C")
             return typ.dtype if typ.ndim == 1 and typ.entries[attr][1] == 1 else PartReference(typ, attr)
 
     def by_numba(context: Any, builder: Any, sig: Any, place: _ArrayReader, args: Any, what: Any) -> Any:
@@ -333,10 +335,10 @@ def _register_arrays(types: Any) -> None:
     @lower_getattr_generic(Reference)
     def entry(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
         first, count = typ.entries[name]
-        if typ.ndim > 1 or count > 1:
-            return value
-        at = _ArrayReader(context, builder, typ, value).element([context.get_constant(types.intp, first)])
-        return load_item(context, builder, typ.array, at)
+        place, index = _ArrayReader(context, builder, typ, value), context.get_constant(types.intp, first)
+        if typ.layout.of.layout.vectors:
+            return place.row(types.Array(typ.dtype, 1, "C"), index)
+        return value if typ.ndim > 1 or count > 1 else load_item(context, builder, typ.array, place.element([index]))
 
     @lower_setattr_generic(Reference)
     def set_entry(context: Any, builder: Any, sig: Any, args: Any, name: str) -> Any:

@@ -80,6 +80,7 @@ class RecordForm(NamedTuple):
     width: int  # count of all numbers
     kind: str  # of number
     rows: bool  # whether there is a row of them for each element
+    vectors: bool  # whether each is a row of the array
 
 
 class Record(np.ndarray):
@@ -87,37 +88,42 @@ class Record(np.ndarray):
 
     ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
     annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
-    each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``.
+    each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``. With ``vectors=True`` each entry is a row
+    of the array, of any length; the array may have further rows. `Annotated[np.ndarray, "mass"]` is another name of
+    ``mass``.
     """
 
     layout: ClassVar[RecordForm]
 
-    def __init_subclass__(cls, kind: str, rows: bool = False) -> None:
+    def __init_subclass__(cls, kind: str, rows: bool = False, vectors: bool = False) -> None:
         entries, width = dict[str, tuple[int, int]](), 0
         for name, text in cls.__annotations__.items():
             if hasattr(Record, name):
                 raise TypeError(f"{cls.__name__}: arrays have an attribute {name!r}; take another name")
             several = re.fullmatch(r"Vector(\d+)", str(text))
-            first, count = entries[name] = width, int(several[1]) if several else 1
-            width += count
-            setattr(cls, name, _entry_property(first, count, rows))
-        cls.layout = RecordForm(entries, width, kind, rows)
+            other = re.fullmatch(r"""Annotated\[np\.ndarray, ["'](\w+)["']\]""", str(text))
+            first, count = entries[name] = entries[other[1]] if other else (width, int(several[1]) if several else 1)
+            width = max(width, first + count)
+            setattr(cls, name, _entry_property(first, count, rows, vectors))
+        cls.layout = RecordForm(entries, width, kind, rows, vectors)
 
     @classmethod
     def blank(cls, *count: int) -> Any:
-        """Record of zeros; of so many rows."""
+        """Record of zeros; of so many rows, or of vectors of such a length."""
         dtype: type = {"Int": np.int64, "Short": np.int32}.get(cls.layout.kind, np.float64)
-        return np.zeros((*count, cls.layout.width), dtype).view(cls)
+        shape = (cls.layout.width, *count) if cls.layout.vectors else (*count, cls.layout.width)
+        return np.zeros(shape, dtype).view(cls)
 
 
-def _entry_property(first: int, count: int, rows: bool) -> property:
-    where = (..., first if count == 1 else slice(first, first + count))
+def _entry_property(first: int, count: int, rows: bool, vectors: bool) -> property:
+    where = first if count == 1 else slice(first, first + count)
+    place = where if vectors else (..., where)
 
     def get(self: Record) -> Any:
-        return self.view(np.ndarray)[where] if count > 1 or rows else self[first]
+        return self.view(np.ndarray)[place] if count > 1 or rows or vectors else self[first]
 
     def put(self: Record, value: Any) -> None:
-        self[where] = value
+        self[place] = value
 
     return property(get, put)
 
@@ -205,7 +211,10 @@ def _declared_layout(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
         return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
     made = scope[text]
     if isinstance(made, type) and issubclass(made, Record):
-        return RecordLayout(_declared_layout(f"{made.layout.kind}{1 + made.layout.rows}", scope, is_complex), made)
+        return RecordLayout(
+            _declared_layout(f"{made.layout.kind}{1 + (made.layout.rows or made.layout.vectors)}", scope, is_complex),
+            made,
+        )
     if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
         return struct_layout(made.__origin__, COMPLEX in made.__metadata__)
     return struct_layout(made, is_complex)

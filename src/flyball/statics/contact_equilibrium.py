@@ -99,7 +99,7 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
     still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)
     if held:
         own = held.start.assembly.compiled
-        held.joints.clock.y[0, : own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
+        held.joints.clock.y.current[: own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
     try:
         stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, held)
         stepper.state.options.restitution_law = NO_RESTITUTION
@@ -190,7 +190,7 @@ class _Settling:
     def _mechanism_velocities(self) -> np.ndarray:
         """View of the velocities of the mechanism."""
         own = self._mechanism().structure
-        return self.stepper.joints.clock.y[0, own.nq : own.nq + own.nv]
+        return self.stepper.joints.clock.y.current[own.nq : own.nq + own.nv]
 
     def _speeds(self) -> dict[str, float]:
         """Speed of every body [m/s]: of its centre, and of its rotation at the radius of gyration."""

@@ -25,7 +25,7 @@ from ...engine.solve import apply_inverse_mass
 from ...math.rotation import rotation_vector
 from ...math.scalar import sqrt
 from ...math.vec import col, dot, mm, norm, sub, transpose
-from ...tables.table_definitions import BIAS, SCHUR, VALUE
+from ...tables.table_definitions import SCHUR
 
 SOFT_SPRING = 1e-3  # h^2 k / m + h c / m below which a spring is evaluated explicitly at half the step
 
@@ -186,7 +186,7 @@ LENGTH_TOLERANCE = 1e-12  # negligible change of a spring's length, relative to 
 def force_length(S, W, k, n, i):
     """Return the length of force k along its direction i of n, at the kinematics in W."""
     if S.forces.family[k] == 1:
-        return W.sensed[VALUE, S.forces.F[k]]
+        return W.sensed.value[S.forces.F[k]]
     F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
     line = sub(M[0], F[0])
     if n == 1:
@@ -211,7 +211,7 @@ def save_spring_biases(A):
         k = int(x.force[i])
         x.bias[i] = 0.0
         if A.S.forces.family[k] == 1:
-            x.bias[i] = A.W.sensed[BIAS, A.S.forces.F[k]]
+            x.bias[i] = A.W.sensed.bias[A.S.forces.F[k]]
         elif x.directions[i] < 2.0:
             x.bias[i] = distance_bias(load_record(A.W.FK, A.S.forces.F[k]), load_record(A.W.FK, A.S.forces.M[k]))
 
@@ -243,7 +243,7 @@ def correct_spring_lengths(A):
     if not stiff:
         return
     h = A.real.step
-    q = A.clock.y[0, : A.S.sizes.coordinates]
+    q = A.clock.y.current[: A.S.sizes.coordinates]
     step = A.mixing[0]
     for _ in range(LENGTH_ITERATIONS):
         call(A.door[0], A.S, A.W, A.R, A.clock, A.output, POSITION)

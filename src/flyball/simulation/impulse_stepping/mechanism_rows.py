@@ -14,8 +14,6 @@ from ...compiler.formulas import formula
 from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
 from ...math.vec import add, load3
 from ...numerics.complementarity.contact_problem import FIXED_SIDE, LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
-from ...tables.table_definitions import BIAS as BEND_OF
-from ...tables.table_definitions import RETURNED, VALUE
 from .implicit_springs import add_wrench_power, impulse_response, with_spring_response
 from .stepping_tables import (
     LINE_FRICTION,
@@ -53,7 +51,7 @@ def line_rate(A, k, v):
 @formula
 def stop_gap(A, k, side):
     """Return the gap of a stop at the start of the step; side 1 is the lower stop, -1 the upper."""
-    x = A.W.sensed[VALUE, A.line.quantity[k]] - 0.5 * A.real.step * line_rate(A, k, A.velocities.before)
+    x = A.W.sensed.value[A.line.quantity[k]] - 0.5 * A.real.step * line_rate(A, k, A.velocities.before)
     return x - A.line_law.lower[k] if side > 0 else A.line_law.upper[k] - x
 
 
@@ -155,9 +153,9 @@ def rope_law(A, P, i, k, x):
     z = 0.25 * h * (h * K + C) * w
     b = z * z / (1.0 + z * z)
     added = h * h * K * (0.25 + 0.75 * b) + h * C * (0.5 + 0.5 * b)
-    bend = h * A.W.sensed[BEND_OF, A.line.quantity[k]]
+    bend = h * A.W.sensed.bias[A.line.quantity[k]]
     r = line_rate(A, k, A.velocities.before) - 0.5 * bend
-    stretch = A.W.sensed[VALUE, A.line.quantity[k]] - A.line_law.length[k] - 0.125 * b * h * bend
+    stretch = A.W.sensed.value[A.line.quantity[k]] - A.line_law.length[k] - 0.125 * b * h * bend
     force = h * K * (stretch - 0.25 * (1.0 - b) * h * r) + 0.5 * h * C * (1.0 - b) * r
     x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
 
@@ -190,7 +188,7 @@ def update_friction_loads(A):
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
         if A.line.kind[k] == LINE_FRICTION and A.S.forces.load[A.line.force[k]] >= 0:
-            A.line_law.load[k] = A.W.sensed[RETURNED, A.S.forces.load[A.line.force[k]]]
+            A.line_law.load[k] = A.W.sensed.returned[A.S.forces.load[A.line.force[k]]]
 
 
 @formula

@@ -248,7 +248,7 @@ def run_task(A, M, C, P, X, task):
         return 0
     if task == TASK_MEAN_VELOCITIES:
         for i in range(A.S.sizes.coordinates):  # at half the step, from where TASK_FINISH continues
-            A.clock.y[2, i] = A.clock.y[0, i]
+            A.clock.y[2, i] = A.clock.y.current[i]
         for d in range(A.velocities.before.shape[0]):
             X.wide[d] = 0.5 * (A.velocities.before[d] + A.velocities.after[d])
         keep_stops_only(A, P, X)
@@ -276,7 +276,7 @@ def run_task(A, M, C, P, X, task):
         A.count.begun = 0
         close_energy_account(A)
         for d in range(A.velocities.before.shape[0]):
-            X.wide[d] = A.clock.y[0, A.S.sizes.coordinates + d]
+            X.wide[d] = A.clock.y.current[A.S.sizes.coordinates + d]
     return 0
 
 
@@ -310,7 +310,7 @@ def start_mechanism(A, M, X):
     save_evaluation(A, A.real.step)
     nq = A.S.sizes.coordinates
     for d in range(A.velocities.before.shape[0]):
-        X.wide[d] = A.velocities.before[d] = A.velocities.after[d] = A.clock.y[0, nq + d]
+        X.wide[d] = A.velocities.before[d] = A.velocities.after[d] = A.clock.y.current[nq + d]
         A.velocities.impulsive[d] = 0.0
     for r in range(A.reactions.smooth.shape[0]):
         A.reactions.impulse[r] = A.reactions.impact[r] = 0.0
@@ -405,7 +405,7 @@ def evaluate_at_mean(A, part):
     nq = A.S.sizes.coordinates
     for d in range(A.velocities.before.shape[0]):
         mean = A.velocities.before[d] + 0.5 * A.velocities.change[d]
-        A.clock.y[0, nq + d] = mean + part * A.velocities.impulsive[d]
+        A.clock.y.current[nq + d] = mean + part * A.velocities.impulsive[d]
     return call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
 
 

@@ -22,7 +22,7 @@ from ...model.force import CoordinateForce, TwoPointForce
 from ...model.geometry import matrix_to_quaternion
 from ...model.model import Model
 from ...numerics.integrators.butcher_tableaux import tableau
-from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...results.phases import cumulative_exchanges, energies_at_end
 from ...results.result import Result
 from ...tables import table_definitions as su
@@ -109,7 +109,7 @@ def mechanism_tables(
     s, S = c.structure, c.values.system
     of, group = velocity_groups(S, s.nv)
     rows = [s.place[name] for name in bodies]
-    y = np.zeros((STATE_ROWS, len(start.y)))
+    y = StateVectors.blank(len(start.y))
     y[0] = start.y
     width = max(len(start.y) + 1, s.nv, len(S.rows.law), 1)
     clock = StepState(
@@ -294,12 +294,12 @@ class MechanismMotion:
     def add(self, A: MechanismTables, moved: bool) -> None:
         """Record the present state, and mean accelerations and multipliers of the last step if there was one."""
         h = float(A.real.step) if moved else 1.0
-        self.y.append(A.clock.y[0].copy())
+        self.y.append(A.clock.y.current.copy())
         self.vdot.append((A.velocities.after - A.velocities.before) / h)
         self.lam.append(A.reactions.smooth + (A.reactions.impulse + A.reactions.impact) / h)
         s = self.start.assembly.compiled.structure
         W = self.start.assembly.compiled.work
-        lost = self.start.assembly.compiled.jacobian() @ A.clock.y[0, s.nq : s.nq + s.nv] - W.rows.nu
+        lost = self.start.assembly.compiled.jacobian() @ A.clock.y.current[s.nq : s.nq + s.nv] - W.rows.nu
         self.gaps.append(float(np.abs(W.rows.value).max(initial=0.0)))
         self.slips.append(float(np.abs(lost).max(initial=0.0)))
 
