@@ -130,7 +130,7 @@ class Stepped:
                     X.wide[part] += sign * change @ Y
                 worst = max(worst, np.abs(N[c] @ change).max())
             for k, (part, J, Y) in enumerate(lines):
-                add, soft, low, high = self.P.line_x[k]
+                add, soft, low, high = self.P.line_law[k]
                 old, per = X.line[k], J @ Y + soft
                 if per > 0.0:
                     new = old - (J @ X.wide[part] + add + soft * old) / per

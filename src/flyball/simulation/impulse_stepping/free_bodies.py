@@ -25,7 +25,6 @@ from ...math.vec import (
     symmetric,
 )
 from ...numerics.complementarity.contact_operator import set_symmetric_block, symmetric_block
-from ...numerics.complementarity.contact_problem import INVERSE_INERTIA
 
 SPIN_ITERATIONS = 20  # Newton iterations for half a step of rotation; three or four are usual
 SPIN_TOLERANCE = 1e-15  # relative change of the angular momentum that is rounding
@@ -95,7 +94,7 @@ def newton_column(inverse, m, w, h, d):
 def inverse_in_world(R, inverse, k, node):
     """Write the inverse inertia in world axes, R J^-1 R', into a node of the cone problem."""
     xx, xy, xz, yy, yz, zz = symmetric_block(inverse, k, 0)
-    set_symmetric_block(node, k, INVERSE_INERTIA, turned_inertia(R, (xx, xy, xz, xy, yy, yz, xz, yz, zz)))
+    set_symmetric_block(node.inverse_inertia, k, 0, turned_inertia(R, (xx, xy, xz, xy, yy, yz, xz, yz, zz)))
 
 
 def rotation_matrices(turn: np.ndarray) -> np.ndarray:
@@ -128,7 +127,7 @@ def velocities_without_contact(N, M, P, X, state):
         for i in range(3):
             M.twist[k, i] = X.v[k, i] + (h * state.gravity[i] if N.body.inverse_mass[k] > 0.0 else 0.0)
             M.twist[k, 3 + i] = X.v[k, 3 + i]
-        P.node[k, 0] = N.body.inverse_mass[k]
+        P.node.inverse_mass[k] = N.body.inverse_mass[k]
         if N.body.isotropic[k] == 0.0:
             inverse_in_world(load9(M.pose, k, 3), N.body.inverse_inertia, k, P.node)
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
 from ...math.vec import add, load3
-from ...numerics.complementarity.contact_problem import FIXED_SIDE, LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
+from ...numerics.complementarity.contact_problem import FIXED_SIDE
 from .implicit_springs import add_wrench_power, impulse_response, with_spring_response
 from .stepping_tables import (
     LINE_FRICTION,
@@ -109,14 +109,14 @@ def line_laws(A, P, n):
     for i in range(n):
         k = abs(A.active.line[i]) - 1
         side = 1 if A.active.line[i] > 0 else -1
-        x = P.line_x[i]
+        x = P.line_law
         P.line_at[i, 0], P.line_at[i, 1] = A.active.group[i], A.active.first[i]
-        x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.0, 0.0, 0.0, INFINITE
+        x.bias[i], x.soft[i], x.lower[i], x.upper[i] = 0.0, 0.0, 0.0, INFINITE
         rate = side * line_rate(A, k, A.velocities.before)
         if A.line.kind[k] == LINE_STOP:
             gap = stop_gap(A, k, side)
             hit = rate < 0.0 and gap + h * rate <= 0.0
-            x[LINE_BIAS] = A.line_law.restitution[k] * rate if hit else max(gap, 0.0) / h
+            x.bias[i] = A.line_law.restitution[k] * rate if hit else max(gap, 0.0) / h
         elif A.line.kind[k] == LINE_ROPE:
             rope_law(A, P, i, k, x)
         else:
@@ -136,7 +136,7 @@ def friction_law(A, P, i, k, x):
     held = h * static_friction_limit(A.S, A.W, A.line.force[k], t, arm, load)
     if abs(rate) > REST_SHARE * held * w:
         held = h * dry_friction(A.S, A.W, A.line.force[k], t, rate, arm, load)
-    x[LINE_LOW], x[LINE_HIGH] = -held, held
+    x.lower[i], x.upper[i] = -held, held
 
 
 @formula
@@ -157,7 +157,7 @@ def rope_law(A, P, i, k, x):
     r = line_rate(A, k, A.velocities.before) - 0.5 * bend
     stretch = A.W.sensed.value[A.line.quantity[k]] - A.line_law.length[k] - 0.125 * b * h * bend
     force = h * K * (stretch - 0.25 * (1.0 - b) * h * r) + 0.5 * h * C * (1.0 - b) * r
-    x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
+    x.bias[i], x.soft[i], x.lower[i], x.upper[i] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
 
 
 @formula
@@ -198,14 +198,14 @@ def keep_stops_only(A, P, X):
     for i in range(P.size[3]):
         k = abs(A.active.line[i]) - 1
         side = 1 if A.active.line[i] > 0 else -1
-        x = P.line_x[i]
+        x = P.line_law
         X.line[i] = 0.0
-        x[LINE_SOFT] = x[LINE_LOW] = x[LINE_HIGH] = 0.0
+        x.soft[i] = x.lower[i] = x.upper[i] = 0.0
         if A.line.kind[k] == LINE_STOP:
             mean = 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
             gap = stop_gap(A, k, side) + A.real.step * side * mean
             A.real.overrun = min(A.real.overrun, gap)
-            x[LINE_BIAS], x[LINE_HIGH] = gap / A.real.step, INFINITE
+            x.bias[i], x.upper[i] = gap / A.real.step, INFINITE
 
 
 @formula

@@ -14,6 +14,7 @@ from ...numerics.complementarity.contact_problem import (
     ContactProblem,
     ContactState,
     ContactWorkspace,
+    Nodes,
     SolverSettings,
     allocate_solver,
     empty_problem,
@@ -75,7 +76,7 @@ class StepWorkspaces:
 
 def make_workspaces(
     contacts: int,
-    node: np.ndarray,
+    node: Nodes,
     turning: bool,
     A: MechanismTables,
     state: RunState,
@@ -131,12 +132,11 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
     return FreeBodies(body, turn.copy(), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros(n), np.zeros((n, 18)))
 
 
-def problem_nodes(free: FreeBodies) -> np.ndarray:
+def problem_nodes(free: FreeBodies) -> Nodes:
     """Return the nodes of the cone problem; those of bodies with anisotropic inertia are filled in every step."""
-    out = np.zeros((len(free.body), 8))
-    out[:, 0] = free.body.inverse_mass[:]
-    out[:, 1:7] = free.body.inverse_inertia
-    out[:, 7] = free.body.isotropic[:]
+    out: Nodes = Nodes.blank(len(free.body))
+    out.inverse_mass, out.inverse_inertia = free.body.inverse_mass, free.body.inverse_inertia
+    out.isotropic = free.body.isotropic
     return out
 
 

@@ -345,7 +345,9 @@ def _empty_tables(layout: Struct) -> Any:
             parts.append(_empty_tables(x))
         else:
             parts.append(
-                x.of.blank(*[0] * x.of.layout.rows) if isinstance(x, RecordLayout) else np.zeros((0,) * x.ndim, x.dtype)
+                x.of.blank(*[0] * (x.array.ndim - 1))
+                if isinstance(x, RecordLayout)
+                else np.zeros((0,) * x.ndim, x.dtype)
             )
     return layout.of(*parts)
 
