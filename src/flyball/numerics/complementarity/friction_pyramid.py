@@ -141,7 +141,7 @@ def pyramid(
         turned, worst = used % 2 == 1, 0.0
         for e in range(n):
             s = n - 1 - e if turned else e
-            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], 32 * s, O.count.directions))
+            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], s, O.count.directions))
         worst = larger_or_nan(worst, sweep_lines(P, X, O, turned))
         used += 1
         if O.count.history:
