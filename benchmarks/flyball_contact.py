@@ -10,9 +10,7 @@ import numpy as np
 
 import flyball as fb
 from flyball.assembly.assemble import assemble
-from flyball.collision.tables import FOUND, GAP
 from flyball.simulation.impulse_stepping.setup import make_stepper, movers_of_assembly, partition_bodies
-from flyball.simulation.impulse_stepping.stepping_tables import WORST_OVERLAP
 from flyball.tables.contact_tables import contact_tables
 
 
@@ -98,9 +96,9 @@ class Run:
             "bi,bij,bj->", w, self.scene.carriers.inertia, w
         )
         return {
-            "contacts": int(C.count[FOUND]),
-            "overlap": float(-1e3 * np.min(C.x[: C.count[FOUND], GAP], initial=0.0)),
-            "worst": float(-1e3 * min(0.0, s.pace.real[WORST_OVERLAP])),
+            "contacts": int(C.count.found),
+            "overlap": float(-1e3 * np.min(C.x.gap[: C.count.found], initial=0.0)),
+            "worst": float(-1e3 * min(0.0, s.state.worst.overlap)),
             "kinetic": float(kinetic),
         }
 

@@ -9,25 +9,16 @@ import time
 
 import numpy as np
 
-from flyball.collision.broad_phase.workspace import ENVELOPES_RENEWED, REBUILDS, Search
+from flyball.collision.broad_phase.workspace import Search
 from flyball.collision.contact_finder import ContactFinder, no_movers
 from flyball.collision.contact_search import REBUILD, STEP
 from flyball.collision.shape_kinds import PLANE, SPHERE
 from flyball.collision.tables import (  # fmt: skip
-    AXES,
-    FOUND,
-    GAP,
-    KIND,
-    MASK,
-    MEMBER,
-    MOVER,
-    NORMAL,
-    PAIRS,
-    PAR,
-    RADIUS,
     Contacts,
+    Dimensions,
     Geometry,
     Movers,
+    Shapes,
 )
 from flyball.compiler.formulas import call, formula
 from flyball.compiler.kernels import kernel
@@ -65,30 +56,31 @@ def box_of_spheres(n):
     x += np.random.default_rng(0).uniform(-0.1, 0.1, (n, 3)) * R
     planes = [((0, 0, 0), (0, 0, 1))]
     planes += [((s * half * (1 - c), s * half * c, 0), (-s * (1 - c), -s * c, 0)) for s in (1, -1) for c in (0, 1)]
-    shape_i, shape_x = np.zeros((n + 5, 9), np.int64), np.zeros((n + 5, 24))
-    shape_i[:, MEMBER], shape_i[:, MASK], shape_i[:n, KIND], shape_i[:n, MOVER] = 1, -1, SPHERE, k
-    shape_i[n:, KIND], shape_i[n:, MOVER] = PLANE, -1
-    shape_x[:, [AXES, AXES + 4, AXES + 8]] = 1.0
-    shape_x[:n, [PAR, RADIUS]], shape_x[n:, RADIUS] = R, np.inf
+    shape, dimensions = Shapes.blank(n + 5), Dimensions.blank(n + 5)
+    shape.member[:], shape.mask[:], shape.kind[:n], shape.mover[:n] = 1, -1, SPHERE, k
+    shape.kind[n:], shape.mover[n:] = PLANE, -1
+    dimensions.axes[:, [0, 4, 8]] = 1.0
+    dimensions.par[:n, 0] = dimensions.radius[:n] = R
+    dimensions.radius[n:] = np.inf
     for i, (p, z) in enumerate(planes, start=n):
         x_axis = np.cross(z, [0.3, 0.5, 0.7])
         x_axis /= np.linalg.norm(x_axis)
-        shape_x[i, :3], shape_x[i, AXES : AXES + 9] = p, np.stack([x_axis, np.cross(z, x_axis), z], 1).ravel()
+        dimensions.place[i], dimensions.axes[i] = p, np.stack([x_axis, np.cross(z, x_axis), z], 1).ravel()
     M = no_movers(n)
     M.pose[:, :3] = x
-    return Geometry(shape_i, shape_x, np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)), M
+    return Geometry(shape, dimensions, np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)), M
 
 
 def pour(F, G, M, rounds):
     """Let all sink a little and push apart what overlaps."""
-    mover = G.shape_i[:, MOVER]
+    mover = G.shape.mover[:]
     for k in range(rounds):
         M.pose[:, 2] -= 0.02 * R * (1.0 - k / rounds)
         for _ in range(3):
             C = F.find(M)
-            n = C.count[FOUND]
+            n = C.count.found
             a, b = mover[C.at[:n, 0]], mover[C.at[:n, 1]]
-            push = 0.5 * np.minimum(C.x[:n, GAP], 0.0)[:, None] * C.x[:n, NORMAL : NORMAL + 3]
+            push = 0.5 * np.minimum(C.x.gap[:n], 0.0)[:, None] * C.x.normal[:n]
             push *= np.where((a < 0) | (b < 0), 2.0, 1.0)[:, None]
             for c in range(3):
                 M.pose[:, c] += np.bincount(a[a >= 0], push[a >= 0, c], len(M.pose))
@@ -120,11 +112,11 @@ def main():
         M.twist[:, :3] = 5e-3 * np.random.default_rng(1).standard_normal((n, 3))
         F.find(M)
         everything = timed(F, M, REBUILD, runs=3, steps=4)
-        made, afresh = F.search.count[ENVELOPES_RENEWED], F.search.count[REBUILDS]
+        made, afresh = F.search.count.envelopes_renewed, F.search.count.rebuilds
         step = timed(F, M, STEP)
-        made, afresh = F.search.count[ENVELOPES_RENEWED] - made, F.search.count[REBUILDS] - afresh
+        made, afresh = F.search.count.envelopes_renewed - made, F.search.count.rebuilds - afresh
         print(
-            f"{n:7d} {F.now.count[PAIRS]:6d} {F.now.count[FOUND]:9d} {step:8.3f} {everything:13.3f} "
+            f"{n:7d} {F.now.count.pairs:6d} {F.now.count.found:9d} {step:8.3f} {everything:13.3f} "
             f"{made / 100:8.1f} ({afresh} times all)"
         )
 

@@ -76,7 +76,7 @@ def random_problem(seed, nc=12, nn=6, ng=0, nl=0, soft=0.0, balls=False, turning
     P.turn[:] = rng.uniform(0.05, 0.3, P.turn.shape)
     for k in range(nl):
         P.line_at[k] = (g := rng.integers(ng)), made.block(g, 1)
-        P.line_x[k] = (
+        P.line_law[k] = (
             0.2 * rng.standard_normal(),
             rng.uniform(0, 0.1),
             *[(0, np.inf), (-0.2, 0.2), (-np.inf, np.inf)][k % 3],
@@ -120,8 +120,8 @@ def dense(P, X):
         N[c * r, c * r] += P.soft[c]
         b[c * r : c * r + 3] += P.bias[c]
     for k in range(nl):
-        N[nc * r + k, nc * r + k] += P.line_x[k, 1]
-        b[nc * r + k] += P.line_x[k, 0]
+        N[nc * r + k, nc * r + k] += P.line_law[k, 1]
+        b[nc * r + k] += P.line_law[k, 0]
     return D, DK, N, b
 
 
@@ -143,7 +143,7 @@ def cone_lack(P, p, u, coulomb=False):
         opening = w[0] + (slip if coulomb else 0)  # De Saxce's correction makes Coulomb's law this condition
         out += [max(0, slip - opening), abs(q[0] * opening + q[1:] @ w[1:])]
     for k in range(P.size[3]):
-        low, high = P.line_x[k, 2:]
+        low, high = P.line_law[k, 2:]
         s, w = p[P.size[0] * r + k], u[P.size[0] * r + k]
         out.append(abs(min(max(s - w, low), high) - s))
     return max(out)

@@ -169,7 +169,7 @@ def test_residuals_by_definition(kind, coulomb, seed):
         near = y if t <= mu * y[0] else max(0.0, edge @ y) / (edge @ edge) * edge
         lack.append(np.linalg.norm(near - p[k]))
         rates.append(lack[-1] / size)
-    for k, line in enumerate(P.line_x, 3 * nc):
+    for k, line in enumerate(P.line_law, 3 * nc):
         size = 1 / N[k, k]
         lack.append(abs(np.clip(p[k] - size * u[k], *line[2:4]) - p[k]))
         rates.append(lack[-1] / size)

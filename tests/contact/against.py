@@ -14,7 +14,11 @@ import numpy as np
 
 from flyball.collision.convex_decomposition import Hull, convex_hull
 from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, HULL, SPHERE
-from flyball.collision.tables import AXES, COUNT, FACE_COUNT, FACE_FIRST, FIRST, KIND, MOVER, PAR, RADIUS, Geometry
+from flyball.collision.tables import (
+    Dimensions,
+    Geometry,
+    Shapes,
+)
 from tests.contact.pairs import separations
 
 NAMES = {
@@ -116,18 +120,23 @@ def rotation(rng):
 def tables(shapes):
     """The shapes as `Geometry`, each on a mover of its own."""
     n = len(shapes)
-    at, x = np.zeros((n, 9), dtype=np.int64), np.zeros((n, 24))
+    at, x = Shapes.blank(n), Dimensions.blank(n)
     rows, faces = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
     first = place = 0
     for k, s in enumerate(shapes):
-        at[k, KIND], at[k, MOVER] = s.kind, k
-        x[k, AXES : AXES + 9] = np.eye(3).ravel()
-        x[k, PAR : PAR + 3] = s.par
-        x[k, RADIUS] = np.linalg.norm(s.par)
+        at.kind[k], at.mover[k] = s.kind, k
+        x.axes[k] = np.eye(3).ravel()
+        x.par[k, :3] = s.par
+        x.radius[k] = np.linalg.norm(s.par)
         if s.hull is not None:
-            table, x[k, PAR + 1] = s.hull.table(place)
-            at[k, [FIRST, COUNT, FACE_FIRST, FACE_COUNT]] = first, len(s.hull.vertices), place, len(s.hull.sides)
-            x[k, RADIUS] = np.max(np.linalg.norm(s.hull.vertices, axis=1))
+            table, x.par[k, 1] = s.hull.table(place)
+            at.first[k], at.count[k], at.face_first[k], at.face_count[k] = (
+                first,
+                len(s.hull.vertices),
+                place,
+                len(s.hull.sides),
+            )
+            x.radius[k] = np.max(np.linalg.norm(s.hull.vertices, axis=1))
             rows.append(s.hull.rows)
             faces.append(table)
             first, place = first + len(s.hull.rows), place + len(table)

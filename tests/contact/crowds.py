@@ -4,28 +4,28 @@ import numpy as np
 
 from flyball.collision.contact_finder import no_movers
 from flyball.collision.shape_kinds import PLANE, SPHERE
-from flyball.collision.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
+from flyball.collision.tables import Dimensions, Geometry, Shapes
 
 
 def geometry(radii, movers=None, planes=(), apart=(), member=1, mask=-1, places=None):
     """Spheres, each on a mover of its own (unless said), then planes that stand still: (point, normal)."""
     n, k = len(radii), len(planes)
-    shape_i, shape_x = np.zeros((n + k, 9), np.int64), np.zeros((n + k, 24))
-    shape_i[:, MEMBER], shape_i[:, MASK] = 1, -1
-    shape_i[:n, MEMBER], shape_i[:n, MASK] = member, mask
-    shape_i[:n, KIND], shape_i[:n, MOVER] = SPHERE, np.arange(n) if movers is None else movers
-    shape_x[:, [AXES, AXES + 4, AXES + 8]] = 1.0
-    shape_x[:n, PAR] = shape_x[:n, RADIUS] = radii
+    shape, dimensions = Shapes.blank(n + k), Dimensions.blank(n + k)
+    shape.member[:], shape.mask[:] = 1, -1
+    shape.member[:n], shape.mask[:n] = member, mask
+    shape.kind[:n], shape.mover[:n] = SPHERE, np.arange(n) if movers is None else movers
+    dimensions.axes[:, [0, 4, 8]] = 1.0
+    dimensions.par[:n, 0] = dimensions.radius[:n] = radii
     if places is not None:
-        shape_x[:n, :3] = places
+        dimensions.place[:n] = places
     for i, (point, normal) in enumerate(planes, start=n):
-        shape_i[i, KIND], shape_i[i, MOVER], shape_x[i, RADIUS] = PLANE, -1, np.inf
+        shape.kind[i], shape.mover[i], dimensions.radius[i] = PLANE, -1, np.inf
         z = np.array(normal) / np.linalg.norm(normal)
         x = np.cross(z, [0.3, 0.5, -0.7])
         x /= np.linalg.norm(x)
-        shape_x[i, :3], shape_x[i, AXES : AXES + 9] = point, np.stack([x, np.cross(z, x), z], 1).ravel()
+        dimensions.place[i], dimensions.axes[i] = point, np.stack([x, np.cross(z, x), z], 1).ravel()
     pairs = np.array(sorted((min(p), max(p)) for p in apart), np.int64).reshape(-1, 2)
-    return Geometry(shape_i, shape_x, np.zeros((0, 3)), np.zeros(0, np.int64), pairs)
+    return Geometry(shape, dimensions, np.zeros((0, 3)), np.zeros(0, np.int64), pairs)
 
 
 def moving(x, v=None):
@@ -53,8 +53,8 @@ def on_planes(G, x, v, r, margin, ahead):
     """The same with the planes of G."""
     n = len(x)
     out = set()
-    for k in range(n, len(G.shape_i)):
-        z, p = G.shape_x[k, [AXES + 2, AXES + 5, AXES + 8]], G.shape_x[k, :3]
+    for k in range(n, len(G.shape)):
+        z, p = G.dimensions.axes[k, [2, 5, 8]], G.dimensions.place[k]
         gap = (x - p) @ z - r
         out |= {(i, k) for i in np.flatnonzero(gap < margin + ahead * np.maximum(0.0, -(v @ z)))}
     return out
@@ -62,17 +62,17 @@ def on_planes(G, x, v, r, margin, ahead):
 
 def pairs_of(C):
     """The pairs of shapes that have contacts."""
-    n = C.count[FOUND]
+    n = C.count.found
     return [(int(a), int(b)) for a, b in C.at[:n, :2]]
 
 
 def gaps_of(C):
     """Gap by pair."""
-    return dict(zip(pairs_of(C), C.x[: C.count[FOUND], GAP]))
+    return dict(zip(pairs_of(C), C.x.gap[: C.count.found]))
 
 
 def identities_hold(C, O, features=True):
     """Every contact names the one of the same shapes and feature before it, if there was one; else none."""
-    n, m = C.count[FOUND], O.count[FOUND]
+    n, m = C.count.found, O.count.found
     told = {tuple(row[:3]): k for k, row in enumerate(O.at[:m].tolist())}
-    return all(told.get(tuple(row[:3]), -1) == row[BEFORE] for row in C.at[:n].tolist())
+    return [told.get(tuple(row[:3]), -1) for row in C.at[:n].tolist()] == C.at.before[:n].tolist()

@@ -6,7 +6,7 @@ import numpy as np
 
 from flyball.collision.narrow_phase.dispatch import collide
 from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
-from flyball.collision.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Geometry, Movers
+from flyball.collision.tables import Dimensions, Geometry, Movers, Shapes
 from tests.compiled import compiled
 
 
@@ -20,20 +20,20 @@ meet = compiled(_collide)
 def geometry(*shapes):
     """Shapes (kind, parameters) or (kind, parameters, vertices, faces), each on a mover of its own."""
     n = len(shapes)
-    shape_i, shape_x = np.zeros((n, 9), dtype=np.int64), np.zeros((n, 24))
+    shape, dimensions = Shapes.blank(n), Dimensions.blank(n)
     vertex, face = [], []
     for k, (kind, par, *more) in enumerate(shapes):
         corners = np.reshape(more[0], (-1, 3)) if more else np.zeros((0, 3))
         faces = more[1] if len(more) > 1 else []
-        shape_i[k, :4] = kind, k, sum(map(len, vertex)), len(corners)
-        shape_i[k, FACE_FIRST], shape_i[k, FACE_COUNT] = sum(len(f) + 1 for f in face), len(faces)
-        shape_x[k, AXES : AXES + 9] = np.eye(3).ravel()
-        shape_x[k, PAR : PAR + len(par)] = par
-        shape_x[k, RADIUS] = np.inf if kind == 1 else np.linalg.norm(par) + max([0, *np.linalg.norm(corners, axis=1)])
+        shape[k, :4] = kind, k, sum(map(len, vertex)), len(corners)
+        shape.face_first[k], shape.face_count[k] = sum(len(f) + 1 for f in face), len(faces)
+        dimensions.axes[k] = np.eye(3).ravel()
+        dimensions.par[k, : len(par)] = par
+        dimensions.radius[k] = np.inf if kind == 1 else np.linalg.norm(par) + max([0, *np.linalg.norm(corners, axis=1)])
         vertex.append(corners)
         face += faces
     flat = np.array([x for f in face for x in (len(f), *f)], dtype=np.int64)
-    return Geometry(shape_i, shape_x, np.concatenate(vertex), flat, np.zeros((0, 2), dtype=np.int64))
+    return Geometry(shape, dimensions, np.concatenate(vertex), flat, np.zeros((0, 2), dtype=np.int64))
 
 
 def contacts(a, b, at_a, at_b, reach=np.inf, exchange=False):

@@ -7,7 +7,7 @@ import pytest
 
 from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
 from flyball.collision.shape_kinds import CONE, PLANE
-from flyball.collision.tables import KIND, MOVER, RADIUS, Movers
+from flyball.collision.tables import Movers
 from tests.contact.against import MODES, NAMES, PAIRS, asked, judged, pool, rotation, sample, tables
 from tests.contact.scenes import meet
 
@@ -49,11 +49,11 @@ def test_gap_over_a_plane_is_that_of_coal(kind):
         R = rotation(rng)
         p = np.array([*rng.normal(size=2), s.top(-R[2]) + rng.choice([0.3, 1e-6, -1e-6, -0.3]) * rng.uniform()])
         one = tables([s])
-        at, x = np.repeat(one.shape_i, 2, axis=0), np.repeat(one.shape_x, 2, axis=0)
-        at[1, KIND], at[1, MOVER], x[1, RADIUS] = PLANE, 1, np.inf
+        at, x = np.repeat(one.shape, 2, axis=0), np.repeat(one.dimensions, 2, axis=0)
+        at.kind[1], at.mover[1], x.radius[1] = PLANE, 1, np.inf
         pose = np.array([[*p, *R.ravel()], [0, 0, 0, *np.eye(3).ravel()]])
         room = np.zeros((SCRATCH_ROWS, 8))
-        count = meet(one._replace(shape_i=at, shape_x=x), Movers(pose, np.zeros((2, 6))), 0, 1, 1.0, room)
+        count = meet(one._replace(shape=at, dimensions=x), Movers(pose, np.zeros((2, 6))), 0, 1, 1.0, room)
         middle = p + (R[:, 2] * s.par[1] / 2 if s.kind == CONE else 0)
         result.clear()
         there = coal.distance(

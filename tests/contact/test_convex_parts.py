@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.collision import tables as ct
 from flyball.collision.convex_decomposition import convex_parts, winding_number
 from flyball.errors import ModelError, PerformanceNotice
 from flyball.model.shapes.geometry import extrude
@@ -108,12 +107,12 @@ def mesh(name):
 
 def distance(G, pose):
     """Least separation of the parts of two bodies."""
-    first, second = (np.flatnonzero(G.shape_i[:, ct.MOVER] == k) for k in (0, 1))
+    first, second = (np.flatnonzero(G.shape.mover[:] == k) for k in (0, 1))
     both = np.array([(a, b) for a in first for b in second]).ravel()
-    mover = pose[G.shape_i[both, ct.MOVER]]
-    place = np.einsum("nij,nj->ni", mover[:, 3:].reshape(-1, 3, 3), G.shape_x[both, ct.PLACE : ct.PLACE + 3])
+    mover = pose[G.shape.mover[both]]
+    place = np.einsum("nij,nj->ni", mover[:, 3:].reshape(-1, 3, 3), G.dimensions.place[both])
     at = np.column_stack([mover[:, :3] + place, mover[:, 3:]])
-    return separations(G._replace(shape_i=G.shape_i[both], shape_x=G.shape_x[both]), at)[:, 0].min()
+    return separations(G._replace(shape=G.shape[both], dimensions=G.dimensions[both]), at)[:, 0].min()
 
 
 def test_distance_of_meshes_is_that_of_coal():
@@ -153,7 +152,7 @@ def test_an_open_mesh_touches_nothing_and_says_so():
     with pytest.raises(ModelError, match="cannot touch anything"):
         touched(fb.Mesh(vertices=v, faces=f[:-1]))
     looks = fb.Mesh(vertices=v, faces=f[:-1], looks=True)
-    assert len(touched(looks).geometry.shape_i) == 0
+    assert len(touched(looks).geometry.shape) == 0
 
 
 def test_hollows_that_stay_filled_are_told():
@@ -167,9 +166,9 @@ def test_hollows_that_stay_filled_are_told():
 
 def test_a_plate_in_the_plane_is_polygons():
     G = touched(fb.Prism(outline=OUTLINES["L"][0], thickness=0.1), planar=True).geometry
-    assert len(G.shape_i) == 2
+    assert len(G.shape) == 2
     area = 0.0
-    for row in G.shape_i:
-        x, y, _ = G.vertex[row[ct.FIRST] : row[ct.FIRST] + row[ct.COUNT]].T
+    for row in G.shape:
+        x, y, _ = G.vertex[row.first : row.first + row.count].T
         area += 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
     assert area == pytest.approx(6)

@@ -12,7 +12,7 @@ import pytest
 from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
 from flyball.collision.shape_kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
 from flyball.collision.shapes.height_field import height_field_rows
-from flyball.collision.tables import COUNT, FIRST, KIND, MOVER, PAR, RADIUS, Geometry, Movers
+from flyball.collision.tables import Geometry, Movers
 from flyball.errors import ModelError
 from tests.contact.against import NAMES, pool, rotation, tables
 from tests.contact.pairs import separations
@@ -189,8 +189,8 @@ def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kin
         p = np.array([*rng.uniform(0.7, 1.7, 2), 0.35 + s.top(-R[2]) - rng.uniform(0, 0.25)])
         G = tables([s])
         exact = (of_triangles(G, triangles, p, R) - s.rounding).min()
-        at, x = np.repeat(G.shape_i, 2, axis=0), np.repeat(G.shape_x, 2, axis=0)
-        at[1, KIND], at[1, MOVER], at[1, FIRST], x[1, PAR : PAR + 4], x[1, RADIUS] = FIELD, 1, len(G.vertex), par, 4
+        at, x = np.repeat(G.shape, 2, axis=0), np.repeat(G.dimensions, 2, axis=0)
+        at.kind[1], at.mover[1], at.first[1], x.par[1, :4], x.radius[1] = FIELD, 1, len(G.vertex), par, 4
         both = Geometry(at, x, np.concatenate([G.vertex, rows]), G.face, G.apart)
         pose = np.array([[*p, *R.ravel()], [0, 0, 0, *I.ravel()]])
         room = np.zeros((SCRATCH_ROWS, 8))
@@ -206,9 +206,9 @@ def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kin
 def of_triangles(G, triangles, p, R):
     """Separation of the one shape's core, at p turned by R, from each triangle."""
     m = len(triangles)
-    at, x = np.repeat(G.shape_i, 2 * m, axis=0), np.repeat(G.shape_x, 2 * m, axis=0)
-    at[1::2, KIND], at[1::2, COUNT], at[1::2, FIRST] = HULL, 3, len(G.vertex) + 3 * np.arange(m)
-    x[1::2, PAR], x[1::2, PAR + 1] = 0, -1
+    at, x = np.repeat(G.shape, 2 * m, axis=0), np.repeat(G.dimensions, 2 * m, axis=0)
+    at.kind[1::2], at.count[1::2], at.first[1::2] = HULL, 3, len(G.vertex) + 3 * np.arange(m)
+    x.par[1::2, 0], x.par[1::2, 1] = 0, -1
     pose = np.tile([*p, *R.ravel()], (2 * m, 1))
     pose[1::2] = [0, 0, 0, *I.ravel()]
     vertex = np.concatenate([G.vertex, triangles.reshape(-1, 3)])
@@ -259,7 +259,7 @@ LENS = '''"""Two caps of a sphere, base to base: what is within the radius of bo
 
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
-from ..tables import PAR
+
 
 KIND = 12
 
@@ -267,7 +267,7 @@ KIND = 12
 @formula
 def support(G, i, d):
     """Parameters: radius of the spheres, distance of either centre from the middle plane."""
-    r, c = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    r, c = G.dimensions.par[i, 0], G.dimensions.par[i, 1]
     s = sqrt(d[0] * d[0] + d[1] * d[1])
     n = sqrt(s * s + d[2] * d[2])
     z = -c if d[2] > 0.0 else c

@@ -11,7 +11,7 @@ from flyball.collision.convex_decomposition import EDGE_SEARCH_VERTICES, convex_
 from flyball.collision.narrow_phase.primitives import MAX_CORNERS
 from flyball.collision.shape_kinds import HULL
 from flyball.collision.shapes.hull import face, support
-from flyball.collision.tables import COUNT, FACE_COUNT, KIND, PAR, Geometry
+from flyball.collision.tables import Dimensions, Geometry, Shapes
 from flyball.errors import ModelError
 from tests.compiled import compiled
 
@@ -19,10 +19,10 @@ CUBE = np.array(list(itertools.product((-1, 1), repeat=3)), dtype=float)
 
 
 def table(h, radius=0.0):
-    at, x = np.zeros((1, 9), dtype=np.int64), np.zeros((1, 24))
-    at[0, KIND], at[0, COUNT], at[0, FACE_COUNT] = HULL, len(h.vertices), len(h.sides)
-    faces, x[0, PAR + 1] = h.table(0)
-    x[0, PAR] = radius
+    at, x = Shapes.blank(1), Dimensions.blank(1)
+    at.kind[0], at.count[0], at.face_count[0] = HULL, len(h.vertices), len(h.sides)
+    faces, x.par[0, 1] = h.table(0)
+    x.par[0, 0] = radius
     return Geometry(at, x, h.rows, faces, np.zeros((0, 2), dtype=np.int64))
 
 

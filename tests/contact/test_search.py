@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from flyball.collision.broad_phase.workspace import ENVELOPES_RENEWED, PAIRS_COMPARED, PAIRS_EXAMINED, REBUILDS
 from flyball.collision.contact_finder import ContactFinder, no_contacts
 from flyball.collision.contact_matching import matching_contact
-from flyball.collision.tables import FOUND, GAP, NORMAL, PAIRS, POINT
 from flyball.errors import ModelError
 from tests.contact.crowds import gaps_of, geometry, identities_hold, moving, on_planes, pairs_of, spheres_that_touch
 
@@ -51,14 +49,14 @@ def test_the_contacts_are_those_of_all_pairs_step_by_step(ratio, speed):
 def test_gap_normal_and_point_of_spheres_and_planes():
     G = geometry([0.5, 0.25], planes=[((0, 0, 0), (0, 0, 1))])
     C = ContactFinder(G, margin=0.01).find(moving([[0.3, 0, 0.49], [0.3, 0.6, 0.49 + 0.45]]))
-    rows = {pair: C.x[k, :7] for k, pair in enumerate(pairs_of(C))}
+    rows = {pair: C.x[k] for k, pair in enumerate(pairs_of(C))}
     assert set(rows) == {(0, 1), (0, 2)}
-    assert rows[0, 1][GAP] == pytest.approx(0.75 - 0.75, abs=1e-15)
-    assert rows[0, 1][NORMAL : NORMAL + 3] == pytest.approx([0, 0.8, 0.6])
-    assert rows[0, 1][POINT : POINT + 3] == pytest.approx([0.3, 0.4, 0.49 + 0.3])
-    assert rows[0, 2][GAP] == pytest.approx(-0.01)
-    assert rows[0, 2][NORMAL : NORMAL + 3] == pytest.approx([0, 0, -1])  # from the sphere to the plane
-    assert rows[0, 2][POINT : POINT + 3] == pytest.approx([0.3, 0, -0.005])
+    assert rows[0, 1].gap == pytest.approx(0.75 - 0.75, abs=1e-15)
+    assert rows[0, 1].normal == pytest.approx([0, 0.8, 0.6])
+    assert rows[0, 1].point == pytest.approx([0.3, 0.4, 0.49 + 0.3])
+    assert rows[0, 2].gap == pytest.approx(-0.01)
+    assert rows[0, 2].normal == pytest.approx([0, 0, -1])  # from the sphere to the plane
+    assert rows[0, 2].point == pytest.approx([0.3, 0, -0.005])
 
 
 def test_spheres_at_one_place_have_a_normal():
@@ -111,7 +109,7 @@ def test_shapes_that_stand_still_do_not_meet_and_planes_may_move():
     movers = [-1, -1, 0]
     places = [[0, 0, 0], [0.1, 0, 0], [0, 0, 0]]
     G = geometry([0.2, 0.2, 0.2], movers=movers, places=places, planes=[((0, 0, 0), (0, 0, 1))])
-    G.shape_i[3, 1] = 1  # on a mover
+    G.shape[3, 1] = 1  # on a mover
     F = ContactFinder(G)
     for height, want in ((-2.0, []), (-0.1, [(0, 3), (1, 3)]), (1.0, [(0, 3), (1, 3), (2, 3)])):
         C = F.find(moving([[0.3, 0, 0.5], [0, 0, height]]))
@@ -133,14 +131,14 @@ def test_what_falls_together_is_looked_at_as_if_at_rest():
         M = moving(x, v)
         M.twist[0, :3] += [40.0, 0, 0]
         C = fall.find(M)
-        listed.append(C.count[PAIRS])
+        listed.append(C.count.pairs)
         v[:, 2] -= 9.81 * STEP
         x = x + STEP * v
         x[0, 0] += STEP * 40.0
         if k == 20:
-            last = fall.search.count[REBUILDS]
-    assert fall.search.count[REBUILDS] == last <= 2
-    assert max(listed[1:]) < 1.2 * rest.now.count[PAIRS] + 100
+            last = fall.search.count.rebuilds
+    assert fall.search.count.rebuilds == last <= 2
+    assert max(listed[1:]) < 1.2 * rest.now.count.pairs + 100
     assert x[1, 2] < -11.0
 
 
@@ -149,9 +147,9 @@ def test_contacts_stay_themselves_while_pairs_are_looked_for_anew():
     r, x, _ = crowd(rng, 300, 4.0, 0.0)
     F = ContactFinder(geometry(r, planes=BOX), margin=MARGIN, ahead=STEP)
     first = F.find(moving(x))
-    names = first.at[: first.count[FOUND], :3].copy()
+    names = first.at[: first.count.found, :3].copy()
     again = F.find(moving(x), rebuild=True)
-    assert again.count[FOUND] == len(names)
+    assert again.count.found == len(names)
     assert np.array_equal(names[again.at[: len(names), 3]], again.at[: len(names), :3])
     # one goes to the other side and back: only its own are new
     one = np.bincount(names[:, :2].ravel())[:300].argmax()
@@ -159,7 +157,7 @@ def test_contacts_stay_themselves_while_pairs_are_looked_for_anew():
     y[one] += [0, 0, 9.0]
     F.find(moving(y))
     C = F.find(moving(x))
-    new = C.at[: C.count[FOUND]][C.at[: C.count[FOUND], 3] < 0]
+    new = C.at[: C.count.found][C.at[: C.count.found, 3] < 0]
     assert len(new) == (names[:, :2] == one).any(1).sum() > 3
     assert np.all((new[:, :2] == one).any(1))
 
@@ -171,7 +169,7 @@ def test_the_same_every_time():
     for k in range(20):
         M = moving(x + k * STEP * v, v)
         a, b = one.find(M), other.find(M)
-        n = a.count[FOUND]
+        n = a.count.found
         assert np.array_equal(a.at[:n], b.at[:n]) and np.array_equal(a.x[:n], b.x[:n])
 
 
@@ -185,7 +183,7 @@ def test_work_is_linear(ratio):
         side = (4 * (r**3).sum() / 0.3) ** (1 / 3)  # a third of the space filled
         F = ContactFinder(geometry(r), margin=1e-4)
         C = F.find(moving(rng.uniform(0, side, (n, 3))))
-        each.append((F.search.count[PAIRS_COMPARED] / n, F.search.count[PAIRS_EXAMINED] / n, C.count[FOUND] / n))
+        each.append((F.search.count.pairs_compared / n, F.search.count.pairs_examined / n, C.count.found / n))
     assert each[1] == pytest.approx(each[0], rel=0.3)
     assert each[1][0] < 300
 
@@ -198,8 +196,8 @@ def test_a_flat_crowd_and_one_far_away_cost_no_more():
     x[0] = [1e9, -1e7, 3e8]
     F = ContactFinder(geometry(np.full(n, 0.1)))
     C = F.find(moving(x))
-    assert F.search.count[PAIRS_COMPARED] < 10 * n
-    assert C.count[FOUND] == len(spheres_that_touch(x, 0 * x, np.full(n, 0.1), 0.0, 0.0))
+    assert F.search.count.pairs_compared < 10 * n
+    assert C.count.found == len(spheres_that_touch(x, 0 * x, np.full(n, 0.1), 0.0, 0.0))
 
 
 def test_one_that_moves_is_looked_for_alone():
@@ -207,15 +205,15 @@ def test_one_that_moves_is_looked_for_alone():
     r, x, _ = crowd(rng, 500, 2.0, 0.0)
     F = ContactFinder(geometry(r), margin=MARGIN, ahead=STEP)
     F.find(moving(x))
-    made = F.search.count[ENVELOPES_RENEWED]
+    made = F.search.count.envelopes_renewed
     v = np.zeros_like(x)
     v[3] = [0, 3.0, 0]
     for _ in range(20):
         x = x + STEP * v
         C = F.find(moving(x, v))
         assert set(pairs_of(C)) == spheres_that_touch(x, v, r, MARGIN, STEP)
-    assert F.search.count[REBUILDS] == 1
-    assert F.search.count[ENVELOPES_RENEWED] - made <= 20
+    assert F.search.count.rebuilds == 1
+    assert F.search.count.envelopes_renewed - made <= 20
 
 
 def test_a_pose_that_is_no_number_is_named():
@@ -245,14 +243,14 @@ def test_what_asks_for_more_room_goes_on_as_if_it_had_it():
         C = F.find(moving(size * x))
         assert set(pairs_of(C)) == spheres_that_touch(size * x, 0 * x, np.full(n, 0.05), MARGIN, 0.0)
         assert identities_hold(C, F.before)
-    assert C.count[FOUND] > 4 * n + 64
+    assert C.count.found > 4 * n + 64
 
 
 def test_crowds_of_none_of_one_and_of_points():
     none = ContactFinder(geometry([])).find(moving(np.zeros((0, 3))))
-    assert none.count[FOUND] == 0
+    assert none.count.found == 0
     ground = ContactFinder(geometry([], planes=BOX)).find(moving(np.zeros((2, 3))))
-    assert ground.count[FOUND] == 0
+    assert ground.count.found == 0
     one = ContactFinder(geometry([0.5], planes=BOX), margin=1e-9).find(moving([[0, 0, 0.5]]))
     assert pairs_of(one) == [(0, 1)]
     rng = np.random.default_rng(0)
@@ -263,7 +261,7 @@ def test_crowds_of_none_of_one_and_of_points():
 
 def test_a_contact_without_a_namesake_is_the_nearest_one():
     O = no_contacts(8)
-    O.count[FOUND] = 5
+    O.count.found = 5
     O.at[:5, :3] = [[0, 1, 7], [2, 3, 5], [2, 3, 6], [2, 3, 8], [2, 4, 5]]
     O.x[1:4, 0] = 0.0, 1.0, 1.1
     assert matching_contact(O, (2, 3), 1, 8, (0.0, 0, 0), 1.0, 0) == (3, 4)  # by its name, wherever it is

@@ -134,7 +134,7 @@ def contacts(shape, other, rng):
         model = m.snapshot()
         scene = contact_tables(model, element_numbers(model), ["b"])
         found = ContactFinder(scene.geometry, margin=0.1).find(scene.carriers.movers)
-        out.append(found.x[: found.count[0], :7])
+        out.append(found.x[: found.count.found, :7])
     return out
 
 

@@ -10,7 +10,6 @@ from flyball.simulation.events.context import EventContext
 from flyball.simulation.initial_state import find_initial_state
 from flyball.simulation.method_choice import SimulateOptions
 from flyball.simulation.simulate import clock_for
-from flyball.tables.table_definitions import VALUE
 
 ASKED = {
     "method": "dop853", "t_end": 1.0, "t_start": None, "outputs": 2, "parameters": None, "start": None,
@@ -35,7 +34,7 @@ def modes(here: EventContext) -> list[float]:
 def ways(here: EventContext) -> list[float]:
     """Ways of all switches."""
     n = len(here.c.system.switches.row)
-    return here.c.work.sensed[VALUE, here.c.work.sensed.shape[1] - n :].tolist()
+    return here.c.work.sensed.value[here.c.work.sensed.shape[1] - n :].tolist()
 
 
 def moving(here: EventContext) -> dict[str, np.ndarray]:

@@ -13,7 +13,6 @@ from flyball.engine.loads import SLOPES_UNKNOWN
 from flyball.model.contact_point import Touch
 from flyball.simulation.initial_state import find_initial_state
 from flyball.simulation.method_choice import unsupported_contacts, with_contact_points
-from flyball.tables.table_definitions import VALUE
 
 G, MU = 9.81, 0.3
 BALL = fb.Sphere(radius=0.1)
@@ -39,7 +38,7 @@ def moving(m, modes, ways, coordinates="absolute"):
     c = a.compiled
     W, n = c.work, len(c.structure.switches)
     W.modes.mode[: len(modes)] = modes
-    W.sensed[VALUE, W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
+    W.sensed.value[W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
     W.counts.load_updates = SLOPES_UNKNOWN
     status, dy = c.at(a.t, a.q, a.v, MOTION)
     assert status == 0

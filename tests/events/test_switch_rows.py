@@ -18,7 +18,6 @@ from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
 from flyball.model.force import Switch
 from flyball.simulation.initial_state import find_initial_state
-from flyball.tables.table_definitions import VALUE
 from tests.mechanisms import four_bar
 
 
@@ -113,4 +112,4 @@ def test_analyses_of_positions_know_nothing_of_it():
 def test_modes_begin_off():
     a = double(("A.angle",), "joint")
     assert (a.compiled.work.modes.mode == OFF).all()
-    assert a.compiled.work.sensed[VALUE, -1] == 0.0
+    assert a.compiled.work.sensed.value[-1] == 0.0

@@ -100,8 +100,8 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     real.t_end, real.rtol, real.atol, real.span, real.largest = t_end, rtol, 1e-2 * rtol, t_end, t_end
     real.h_max = min(h_max, t_end)
     count.quota, count.limit, count.controlled = 1000, most, 2 * n
-    Y = np.zeros((ex.STATE_ROWS, 2 * n))
-    Y[0], Y[ex.UNIT] = y, 1.0
+    Y = ex.StateVectors.blank(2 * n)
+    Y[0], Y.unit = y, 1.0
     K = np.zeros((len(R.c) + 1, 2 * n))
     c = ex.StepState(real, count, np.array(times, float), Y, K, np.zeros(0, np.int64), np.zeros((6, 0)))
     out, rows, events = np.zeros((64, 1 + 2 * n)), [], []

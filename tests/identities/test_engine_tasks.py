@@ -13,7 +13,7 @@ from flyball.engine.pulse_detection import INSPECTION_ROWS
 from flyball.engine.residual import DAMPING, DIRECTIONS, FORCE_ALONG, SLOPE_WIDTH, STIFFNESS
 from flyball.engine.stabilization import BAUMGARTE, NONE, STEPS
 from flyball.numerics.integrators.butcher_tableaux import tableau
-from flyball.numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from flyball.numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from flyball.simulation.initial_state import find_initial_state
 from tests.mechanisms import four_bar
 
@@ -23,7 +23,7 @@ LAYERS = pytest.mark.parametrize("tree", [(), ("A", "B")], ids=["absolute", "joi
 def perform(c, y, task, rows=1, width=1, rates=None):
     """Have the engine do a task at a state y: rows of output, and the rates."""
     K = np.zeros((1, len(y))) if rates is None else rates[None].copy()
-    Y, out = np.zeros((STATE_ROWS, len(y))), np.zeros((rows, width))
+    Y, out = StateVectors.blank(len(y)), np.zeros((rows, width))
     Y[0] = y
     none = np.zeros(0, np.int64)
     clock = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), Y, K, none, np.zeros((INSPECTION_ROWS, 0)))

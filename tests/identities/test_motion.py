@@ -61,14 +61,15 @@ def test_compiled_is_plain_python(name):
     c, y = ready(name, stabilization.STAGES)
     plain, _ = ready(name, stabilization.STAGES)
     clock = explicit.StepState(
-        np.r_[1e-3, np.zeros(9)],
-        np.zeros(9, np.int64),
+        explicit.StepReals.blank(),
+        explicit.StepCounts.blank(),
         np.zeros(0),
-        np.vstack([y, 0 * y, 0 * y]),
+        explicit.StateVectors.blank(len(y)),
         np.zeros((1, len(y))),
         np.zeros(0, np.int64),
         np.zeros((6, 0)),
     )
+    clock.real.t, clock.y.current = 1e-3, y
     status = run_task(c.values.system, c.work, tableau("rk45"), clock, np.zeros((0, 0)), MOTION)
     dy = np.zeros(len(y))
     again = motion.derivative(1e-3, y.copy(), dy, plain.values.system, plain.work)

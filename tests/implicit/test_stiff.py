@@ -20,8 +20,8 @@ def bushing(damping, *more):
 
 
 def clock_at(start):
-    real, y = ex.StepReals.blank(), np.zeros((ex.STATE_ROWS, len(start.y)))
-    y[ex.CURRENT] = start.y
+    real, y = ex.StepReals.blank(), ex.StateVectors.blank(len(start.y))
+    y.current = start.y
     return ex.StepState(real, ex.StepCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 

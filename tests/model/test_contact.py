@@ -9,7 +9,6 @@ import pytest
 
 import flyball as fb
 from flyball.collision import shape_kinds
-from flyball.collision import tables as ct
 from flyball.model.toml_file import dumps, loads
 from flyball.tables.contact_tables import ContactTables, contact_tables
 from flyball.tables.element_numbers import element_numbers
@@ -25,21 +24,21 @@ def tables(m: fb.Mechanism, *names: str) -> ContactTables:
 
 def meet(t: ContactTables, a: int, b: int) -> bool:
     """Whether two shapes may touch, as the search decides it."""
-    i, j = t.geometry.shape_i[a], t.geometry.shape_i[b]
-    if i[ct.MOVER] == j[ct.MOVER] or not (i[ct.MEMBER] & j[ct.MASK] and j[ct.MEMBER] & i[ct.MASK]):
+    i, j = t.geometry.shape[a], t.geometry.shape[b]
+    if i.mover == j.mover or not (i.member & j.mask and j.member & i.mask):
         return False
-    return sorted((i[ct.MOVER], j[ct.MOVER])) not in t.geometry.apart.tolist()
+    return sorted((i.mover, j.mover)) not in t.geometry.apart.tolist()
 
 
 def pairs(t: ContactTables) -> set[tuple[str, str]]:
-    n = len(t.geometry.shape_i)
+    n = len(t.geometry.shape)
     return {(t.name(a), t.name(b)) for a in range(n) for b in range(a + 1, n) if meet(t, a, b)}
 
 
 def row(t: ContactTables, a: str, b: str) -> np.ndarray:
     """What the surfaces of two parts are to each other."""
     names = [t.name(k) for k in range(len(t.part))]
-    i, j = (t.geometry.shape_i[names.index(x), ct.MATERIAL] for x in (a, b))
+    i, j = (t.geometry.shape.material[names.index(x)] for x in (a, b))
     assert t.surfaces.pair[i, j].tolist() == t.surfaces.pair[j, i].tolist()
     return t.surfaces.pair[i, j]
 
@@ -125,11 +124,11 @@ def test_shapes_lie_from_the_centre_of_mass() -> None:
     m.add(fb.Contact(friction=0.3))
     g = tables(m).geometry
     com = element_numbers(m).bodies["a"].com
-    assert g.shape_i[:, ct.KIND].tolist() == [shape_kinds.SPHERE, shape_kinds.BOX]
-    assert g.shape_x[0, ct.PLACE : ct.PLACE + 3] == pytest.approx(-com)
-    assert g.shape_x[1, ct.PLACE : ct.PLACE + 3] == pytest.approx(np.array([1, 0, 0]) - com)
-    assert g.shape_x[1, ct.PAR : ct.PAR + 3] == pytest.approx([0.1, 0.2, 0.3])
-    assert g.shape_x[1, ct.RADIUS] == pytest.approx(0.14**0.5)
+    assert g.shape.kind[:].tolist() == [shape_kinds.SPHERE, shape_kinds.BOX]
+    assert g.dimensions.place[0] == pytest.approx(-com)
+    assert g.dimensions.place[1] == pytest.approx(np.array([1, 0, 0]) - com)
+    assert g.dimensions.par[1, :3] == pytest.approx([0.1, 0.2, 0.3])
+    assert g.dimensions.radius[1] == pytest.approx(0.14**0.5)
 
 
 def test_looks_and_holes_touch_nothing_unless_told() -> None:
@@ -142,7 +141,7 @@ def test_looks_and_holes_touch_nothing_unless_told() -> None:
         fb.Sphere(radius=0.4, contact=False),
     ]
     m.add(fb.Body("a", shape=shapes, density=1000), fb.Contact(friction=0.3))
-    assert tables(m).geometry.shape_x[:, ct.PAR].tolist() == [0.1, 0.3]
+    assert tables(m).geometry.dimensions.par[:, 0].tolist() == [0.1, 0.3]
 
 
 def test_many_bodies_are_as_single_ones() -> None:
@@ -189,9 +188,9 @@ def test_many_bodies_in_the_plane() -> None:
                     angle=[0, 0.5], angular_velocity=2, velocity=(1, 0)))  # fmt: skip
     m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1)), position=(0, -0.1)), fb.Contact(friction=0.1))
     t = tables(m)
-    assert t.geometry.shape_i[:, ct.KIND].tolist() == [shape_kinds.PLANE, shape_kinds.SPHERE, shape_kinds.SPHERE]
-    assert t.geometry.shape_x[0, ct.AXES : ct.AXES + 9].reshape(3, 3)[:, 2] == pytest.approx([0, 1, 0])
-    assert np.linalg.det(t.geometry.shape_x[0, ct.AXES : ct.AXES + 9].reshape(3, 3)) == pytest.approx(1)
+    assert t.geometry.shape.kind[:].tolist() == [shape_kinds.PLANE, shape_kinds.SPHERE, shape_kinds.SPHERE]
+    assert t.geometry.dimensions.axes[0].reshape(3, 3)[:, 2] == pytest.approx([0, 1, 0])
+    assert np.linalg.det(t.geometry.dimensions.axes[0].reshape(3, 3)) == pytest.approx(1)
     pose = t.carriers.movers.pose[1]
     assert pose[3:].reshape(3, 3) == pytest.approx(
         np.array([[np.cos(0.5), -np.sin(0.5), 0], [np.sin(0.5), np.cos(0.5), 0], [0, 0, 1]])
@@ -258,5 +257,5 @@ def test_a_hundred_thousand_spheres() -> None:
     )
     m.add(fb.Contact(friction=0.3))
     t = tables(m)
-    assert len(t.geometry.shape_i) == 100_000
+    assert len(t.geometry.shape) == 100_000
     assert t.carriers.mass == pytest.approx(np.full(100_000, 4000 / 3 * np.pi * 0.1**3))

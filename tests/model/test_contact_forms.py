@@ -21,12 +21,12 @@ rng = np.random.default_rng(5)
 
 def far(G: ct.Geometry, i: int, d: np.ndarray) -> float:
     """How far shape i goes along d, from its mover's origin."""
-    x, first = G.shape_x[i], G.shape_i[i, ct.FIRST]
-    u, par = x[ct.AXES : ct.AXES + 9].reshape(3, 3).T @ d, x[ct.PAR : ct.PAR + 8]
-    kind, across = G.shape_i[i, ct.KIND], np.hypot(u[0], u[1])
-    vertex = G.vertex[first : first + G.shape_i[i, ct.COUNT]]
+    x, first = G.dimensions[i], G.shape.first[i]
+    u, par = x.axes.reshape(3, 3).T @ d, x.par
+    kind, across = G.shape.kind[i], np.hypot(u[0], u[1])
+    vertex = G.vertex[first : first + G.shape.count[i]]
     return (
-        x[ct.PLACE : ct.PLACE + 3] @ d
+        x.place @ d
         + {
             shape_kinds.SPHERE: lambda: par[0],
             shape_kinds.BOX: lambda: par[:3] @ np.abs(u),
@@ -60,10 +60,10 @@ def test_forms_reach_as_far_as_the_surface(shape) -> None:
     v = p + shape.surface(n, 256)[0] @ R.T
     for d in rng.normal(size=(50, 3)):
         d /= np.linalg.norm(d)
-        reach = [far(G, i, d) for i in range(len(G.shape_i))]
+        reach = [far(G, i, d) for i in range(len(G.shape))]
         assert max(reach) == pytest.approx((v @ d).max(), abs=3e-4 * np.ptp(v))
-        for i, x in enumerate(G.shape_x):  # no form goes beyond the ball that is said to hold it
-            assert reach[i] <= x[ct.PLACE : ct.PLACE + 3] @ d + x[ct.RADIUS] * (1 + 1e-12)
+        for i, x in enumerate(G.dimensions):  # no form goes beyond the ball that is said to hold it
+            assert reach[i] <= x.place @ d + x.radius * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
@@ -82,7 +82,7 @@ def test_outlines_reach_as_far_as_the_surface(shape) -> None:
     v = p + shape.surface(n, 256)[0] @ R.T
     for turn in rng.uniform(0, 2 * np.pi, 50):
         d = np.array([np.cos(turn), np.sin(turn), 0.0])
-        reach = [far(G, i, d) for i in range(len(G.shape_i))]
+        reach = [far(G, i, d) for i in range(len(G.shape))]
         assert max(reach) == pytest.approx((v @ d).max(), abs=3e-4 * np.ptp(v))
     assert not G.vertex[:, 2].any()
 
@@ -91,7 +91,7 @@ def test_outlines_reach_as_far_as_the_surface(shape) -> None:
 def test_round_bars_in_the_plane(kind) -> None:
     """Standing they are circles, lying a segment with round ends and a rectangle."""
     _, G = put(kind(radius=0.1, length=0.4), True)
-    assert (G.shape_i[0, ct.KIND] == shape_kinds.SPHERE) == (kind is fb.Cylinder)
+    assert (G.shape.kind[0] == shape_kinds.SPHERE) == (kind is fb.Cylinder)
     m, G = put(kind(radius=0.1, length=0.4, orientation=(0, np.pi / 2, 0), position=(1, 2)), True)
     assert far(G, 0, np.array([1.0, 0, 0])) == pytest.approx(1 + (0.3 if kind is fb.Capsule else 0.2))
     assert far(G, 0, np.array([0.0, 1, 0])) == pytest.approx(2.1)
@@ -114,9 +114,9 @@ def test_a_landscape() -> None:
     m.add(fb.Ground("hills", shape=fb.HeightField(heights=x + y * y, dx=0.5, dy=0.25), position=(1, 0, 0)))
     m.add(fb.Contact(friction=0.5))
     G = contact_tables(m.snapshot(), element_numbers(m), []).geometry
-    assert G.shape_i[0, ct.KIND] == shape_kinds.FIELD
-    assert G.shape_x[0, ct.PAR : ct.PAR + 4].tolist() == [4, 5, 0.5, 0.25]
-    assert G.shape_x[0, :3].tolist() == [1, 0, 0]
+    assert G.shape.kind[0] == shape_kinds.FIELD
+    assert G.dimensions.par[0, :4].tolist() == [4, 5, 0.5, 0.25]
+    assert G.dimensions.place[0].tolist() == [1, 0, 0]
     assert G.vertex.ravel()[:20] == pytest.approx((x + y * y).ravel())
     v, f = m["hills"].shape.surface(fb.model.element.resolve(m["hills"].shape, {}))
     a, b, c = (v[f[:, k]] for k in range(3))

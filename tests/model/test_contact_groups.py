@@ -84,7 +84,7 @@ def test_groups_are_what_is_told(seed: int) -> None:
     names = [t.parts[k] for k in t.part]
     for pair, c in wanted.items():
         i, j = (names.index(x) for x in sorted(pair) * (3 - len(pair)))
-        row = t.surfaces.pair[t.geometry.shape_i[i, 8], t.geometry.shape_i[j, 8]]
+        row = t.surfaces.pair[t.geometry.shape[i, 8], t.geometry.shape[j, 8]]
         assert row[0] == c.friction
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flyball.compiler.kernels import JoinedBuffer, StructBuffer, StructPool
-from flyball.compiler.struct_layout import Complex1, Float1, Float2, Int1, Record
+from flyball.compiler.struct_layout import Column, Complex1, Float1, Float2, Int1, Record, Vector3
 
 
 class Inner(NamedTuple):
@@ -96,6 +96,28 @@ def test_entries_of_a_record_have_names_in_every_copy():
     one.fields.widths.least, one.array("widths").most = 1.0, 3.0
     assert one.fields.widths.tolist() == [1.0, 3.0]
     assert (other.fields.widths.least, other.fields.widths.copy().most) == (0.0, 2.0)
+
+
+class Points(Record, kind="Float", rows=True):
+    mass: Column
+    place: Vector3
+
+
+class WithRows(NamedTuple):
+    points: Points
+
+
+def test_a_record_by_rows_has_columns_that_are_views():
+    new = WithRows(Points.blank(4))
+    new.points.mass[2], new.points.place[2] = 5.0, (1.0, 2.0, 3.0)
+    assert new.points[2].tolist() == [5.0, 1.0, 2.0, 3.0]
+    made = StructPool(new).new().fields.points
+    assert made.mass.shape == (4,)
+    assert made.place[2].tolist() == [1.0, 2.0, 3.0]
+    new.points.mass = 7.0
+    assert new.points[:, 0].tolist() == [7.0] * 4
+    with pytest.raises(TypeError, match=r"WithRows\.points: 4 numbers"):
+        StructBuffer(WithRows(np.zeros((4, 3)).view(Points)))
 
 
 def test_names_that_arrays_have_are_refused():

@@ -9,7 +9,7 @@ from flyball.compiler.kernels import BoundKernel, StructBuffer, kernel
 from flyball.engine.calls import OutputBuffer
 from flyball.engine.entry_point import ARRIVE, MOTION, REPORT, RESIDUAL, engine, run_task
 from flyball.numerics.integrators.butcher_tableaux import Tableau, tableau
-from flyball.numerics.integrators.time_loop import StepCounts, StepReals, StepState
+from flyball.numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from flyball.simulation.initial_state import find_initial_state
 from flyball.tables.table_definitions import Bodies, System, Work
 from tests.layers import LAYERS
@@ -51,10 +51,10 @@ def desk(model, coordinates):
     s, S = c.structure, c.values.system
     n = len(start.y)
     clock = StepState(
-        StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
+        StepReals.blank(), StepCounts.blank(), np.zeros(0), StateVectors.blank(n), np.zeros((1, n)), np.zeros(0, np.int64),
         np.zeros((6, 0)),
     )  # fmt: skip
-    clock.y[0] = start.y
+    clock.y.current = start.y
     width = 1 + n + s.nv + 3 * len(S.rows.law) + 3 * len(s.measured) + len(s.prescribed)
     return s, S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((3, width)))
 
@@ -65,7 +65,7 @@ def test_a_loop_of_ones_own_calls_the_engine(coordinates):
     s, S, W, R, clock, sheet = desk(model, coordinates)
     assert classical_kernel(engine.address, S, W, R, clock, sheet, 1e-5, 100) == 0
     r = model.simulate(1e-3, coordinates=coordinates, rtol=1e-12, atol=1e-13)
-    assert clock.y[0, : s.nq] == pytest.approx(r.final[1][: s.nq], abs=1e-9)
+    assert clock.y.current[: s.nq] == pytest.approx(r.final[1][: s.nq], abs=1e-9)
 
 
 @pytest.mark.parametrize("coordinates", LAYERS)
@@ -90,7 +90,7 @@ def test_tasks_agree_with_each_other(coordinates):
     row = np.zeros((1, 1 + clock.y.shape[1] + s.nv + nr + len(s.prescribed)))
     assert run_task(S, W, R, clock, row, REPORT) == 0
     assert row[0, 0] == 0.0
-    assert row[0, 1 : 1 + clock.y.shape[1]] == pytest.approx(clock.y[0], abs=1e-12)
+    assert row[0, 1 : 1 + clock.y.shape[1]] == pytest.approx(clock.y.current, abs=1e-12)
 
 
 def test_other_tables_than_those_it_was_made_for_are_refused():
@@ -108,7 +108,7 @@ def test_a_kernel_with_its_structures_bound_to_it():
     bound = BoundKernel(engine, *map(StructBuffer, (S, W, R, clock, sheet)))
     for t in (0.0, 0.3):
         clock.real.t = t
-        clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
+        clock.y.current[s.nq : s.nq + s.nv] *= 1.0 - t
         status = run_task(S, W, R, clock, sheet.rows, MOTION)
         expected, lam = clock.K.copy(), W.rows.multiplier.copy()
         clock.K[:], W.rows.multiplier[:], W.velocities.solved[:] = 0.0, 0.0, 0.0

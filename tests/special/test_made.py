@@ -23,7 +23,7 @@ from flyball.engine.stabilization import NONE, STAGES
 from flyball.numerics.integrators import time_loop as ex
 from flyball.numerics.integrators.butcher_tableaux import tableau
 from flyball.simulation.initial_state import find_initial_state
-from flyball.tables.table_definitions import RATE, TERMS, VALUE
+from flyball.tables.table_definitions import TERMS
 from tests.contract.zoo import PLANAR, SPATIAL, joined
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -67,7 +67,7 @@ def solved(x, S, rows, stabilize=STAGES):
     ) = stabilize, 1e-13, 1e-12 * x.length, 1e-12
     ny = W.y.shape[1]
     clock = ex.StepState(
-        ex.StepReals.blank(), ex.StepCounts.blank(), np.zeros(0), np.zeros((ex.STATE_ROWS, ny)), np.zeros((1, ny)),
+        ex.StepReals.blank(), ex.StepCounts.blank(), np.zeros(0), ex.StateVectors.blank(ny), np.zeros((1, ny)),
         np.zeros(0, np.int64), np.zeros((INSPECTION_ROWS, 0)),
     )  # fmt: skip
     status = run_task(S, W, rk(), clock, rows, COMPLETE)
@@ -79,7 +79,7 @@ def arrays(W, x):
     nm = len(x.structure.measured)
     return {
         "G": W.G, "g": W.rows.value, "nu": W.rows.nu, "gamma": W.rows.gamma, "f": W.velocities.applied,
-        "measured": W.sensed[VALUE, :nm], "rates": W.sensed[RATE, :nm], "x": W.velocities.solved, "M": W.M,
+        "measured": W.sensed.value[:nm], "rates": W.sensed.rate[:nm], "x": W.velocities.solved, "M": W.M,
         "effort": W.velocities.effort, "lam": W.rows.multiplier,
     }  # fmt: skip
 

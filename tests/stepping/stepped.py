@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flyball.collision.tables import GAP, NORMAL, POINT, Contacts, Movers
+from flyball.collision.tables import Movers, no_contacts
 from flyball.engine.entry_point import engine
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 from flyball.simulation.impulse_stepping.mechanism_step import mechanism_kernel
@@ -16,6 +16,7 @@ from flyball.simulation.impulse_stepping.stepping_tables import (
     TASK_MEAN_VELOCITIES,
     TASK_ROWS,
     TASK_START,
+    Jobs,
 )
 from flyball.simulation.initial_state import find_initial_state
 
@@ -32,10 +33,10 @@ class Stepped:
         A = mechanism_tables(start, self.names, 0, h, stops)
         A.count.accept_unsettled = 1  # the loop's shorter steps are not here
         lines = 2 * len(A.line)
-        self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
-        n, nv = len(self.names), A.wide.shape[1]
+        self.A = A._replace(job=Jobs.blank(2 * contacts + lines))
+        n, nv = len(self.names), A.velocities.before.shape[0]
         self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
-        self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
+        self.C = no_contacts(contacts)
         self.P = empty_problem(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
         self.P.group[:] = A.group
         self.X, self.Y = allocate_solver(self.P)[0], allocate_solver(self.P)[0]
@@ -48,15 +49,15 @@ class Stepped:
 
     @property
     def q(self):
-        return self.A.clock.y[0, : self.structure.nq]
+        return self.A.clock.y.current[: self.structure.nq]
 
     @property
     def v(self):
-        return self.A.clock.y[0, self.structure.nq : self.structure.nq + self.structure.nv]
+        return self.A.clock.y.current[self.structure.nq : self.structure.nq + self.structure.nv]
 
     @property
     def z(self):
-        return self.A.clock.y[0, self.structure.nq + self.structure.nv :]
+        return self.A.clock.y.current[self.structure.nq + self.structure.nv :]
 
     def pose(self, name):
         """Mass centre, axes."""
@@ -78,7 +79,7 @@ class Stepped:
                 P.arm[c] = np.r_[
                     [np.subtract(point, self.M.pose[k, :3]) if k >= 0 else np.zeros(3) for k in (a, b)]
                 ].ravel()
-                self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
+                self.C.x.point[c], self.C.x.normal[c], self.C.x.gap[c] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
             X.line[:] = 0.0
             self.ask(TASK_FREE_VELOCITIES)
@@ -129,7 +130,7 @@ class Stepped:
                     X.wide[part] += sign * change @ Y
                 worst = max(worst, np.abs(N[c] @ change).max())
             for k, (part, J, Y) in enumerate(lines):
-                add, soft, low, high = self.P.line_x[k]
+                add, soft, low, high = self.P.line_law[k]
                 old, per = X.line[k], J @ Y + soft
                 if per > 0.0:
                     new = old - (J @ X.wide[part] + add + soft * old) / per

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.collision.tables import MOVER, SHAPE_1, SHAPE_2
+from flyball.collision.tables import ContactShapes, Shapes
 from flyball.simulation.impulse_stepping.step_loop import change_of_gap
 from flyball.simulation.impulse_stepping.stepping_tables import MechanismCounts
 from tests.layers import LAYERS
@@ -72,7 +72,7 @@ def test_a_rod_on_a_hinge_is_stopped_by_an_obstacle(coordinates):
         assert np.abs(s.v).max() < 1e-4
         if coordinates == "absolute":
             joint = 3.0 * w * length / 2 - about * w / d
-            assert np.abs(s.A.lam[1]).max() == pytest.approx(abs(joint), abs=1e-4)
+            assert np.abs(s.A.reactions.impulse).max() == pytest.approx(abs(joint), abs=1e-4)
 
 
 @pytest.mark.parametrize("coordinates", LAYERS)
@@ -145,11 +145,11 @@ def test_what_closing_joints_does_to_a_gap():
         before[k] = np.r_[place, R.as_matrix().ravel()]
         after[k] = np.r_[place + shift, (turn * R).as_matrix().ravel()]
         ways.append(shift + turn.apply(arms[k]) - arms[k])
-    shapes, at = np.zeros((2, MOVER + 1), np.int64), np.zeros((1, 4), np.int64)
-    shapes[:, MOVER] = 0, 1
-    at[0, [SHAPE_1, SHAPE_2]] = 0, 1
+    shapes, at = Shapes.blank(2), ContactShapes.blank(1)
+    shapes.mover = 0, 1
+    at.shape_1, at.shape_2 = 0, 1
     A = SimpleNamespace(pose=before, count=MechanismCounts.blank())
     P = SimpleNamespace(frame=np.r_[normal, np.zeros(6)][None], arm=arms.reshape(1, 6))
     M, C = SimpleNamespace(pose=after), SimpleNamespace(at=at)
-    found = change_of_gap(SimpleNamespace(shape_i=shapes), A, M, C, P, 0)
+    found = change_of_gap(SimpleNamespace(shape=shapes), A, M, C, P, 0)
     assert found == pytest.approx(normal @ (ways[1] - ways[0]), abs=1e-11)

@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.collision.tables import BEFORE, FOUND, Contacts
+from flyball.collision.tables import no_contacts
 from flyball.numerics.complementarity.contact_operator import to_world_frame
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 from flyball.simulation.impulse_stepping.contact_constraints import account_contact, account_rolling, warm_start
 from flyball.simulation.impulse_stepping.restitution import add_expansion
 from flyball.simulation.impulse_stepping.stepping_tables import (
-    COUNTS,
-    HISTORY_COLUMNS,
-    HISTORY_IMPACT_SPIN,
-    HISTORY_IMPACT_VELOCITY,
-    REALS,
-    REDUCED_EXPANSIONS,
-    RunState,
+    ContactMemory,
+    initial_run_state,
 )
 from tests.cone.problems import KINDS, dense, random_problem
 
@@ -89,13 +84,13 @@ def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> 
         return total
 
     seen = (D @ first).reshape(nc, 6)
-    now, pace = (
-        np.zeros((nc, HISTORY_COLUMNS)),
-        RunState(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
+    now, state = (
+        ContactMemory.blank(nc),
+        initial_run_state(np.zeros(3)),
     )
     (
-        now[:, HISTORY_IMPACT_VELOCITY : HISTORY_IMPACT_VELOCITY + 3],
-        now[:, HISTORY_IMPACT_SPIN : HISTORY_IMPACT_SPIN + 3],
+        now.impact_velocity,
+        now.impact_spin,
     ) = seen[:, :3], seen[:, 3:]
     lost = -0.02 * seen.ravel()  # against what the contacts see: energy is lost
     more = 2.0 * rng.standard_normal((nc, 6))
@@ -103,12 +98,12 @@ def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> 
     E.p[:], E.torque[:] = more[:, :3], more[:, 3:]
     X.v[:, :6] = (first + DK.T @ lost).reshape(nodes, 6)
     E.v[:, :6] = X.v[:, :6] + (DK.T @ more.ravel()).reshape(nodes, 6)
-    C = Contacts(np.zeros(8, np.int64), np.zeros((nc, 4), np.int64), np.zeros((nc, 8)))
-    C.count[FOUND] = nc
+    C = no_contacts(nc)
+    C.count.found = nc
     assert kinetic(X.v[:, :6].ravel()) < kinetic(first) < kinetic(E.v[:, :6].ravel())
-    add_expansion(P, np.zeros((nc, 3)), Z, E, X, C, pace, now)
+    add_expansion(P, np.zeros((nc, 3)), Z, E, X, C, state, now)
     assert kinetic(X.v[:, :6].ravel()) == pytest.approx(kinetic(first), rel=1e-12)
-    assert pace.count[REDUCED_EXPANSIONS] == 1
+    assert state.counts.reduced_expansions == 1
 
 
 def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None:
@@ -116,9 +111,10 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     rng, n = np.random.default_rng(4), 5
     P = empty_problem(n, 0, 0, 0, 0, True)
     X, Y = allocate_solver(P)[0], allocate_solver(P)[0]
-    pace, before, now = (
-        RunState(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
-        *np.zeros((2, n, HISTORY_COLUMNS)),
+    state, before, now = (
+        initial_run_state(np.zeros(3)),
+        ContactMemory.blank(n),
+        ContactMemory.blank(n),
     )
     P.at[:] = -1
     P.mu[:] = 1.0
@@ -139,14 +135,14 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     X.p[:], X.torque[:] = 1.0 + rng.random((n, 3)), rng.normal(size=(n, 3))
     was = world()
     for c in range(n):
-        account_contact(P, X, c, (0.0, 0.0, 0.0), pace, before)
-        account_rolling(P, X, Y, c, pace, before)
-    C = Contacts(np.zeros(8, np.int64), np.zeros((n, 4), np.int64), np.zeros((n, 8)))
-    C.count[FOUND], C.at[:, BEFORE] = n, (3, 0, -1, 4, 1)
-    normal = normal[C.at[:, BEFORE]]
+        account_contact(P, X, c, (0.0, 0.0, 0.0), state, before)
+        account_rolling(P, X, Y, c, state, before)
+    C = no_contacts(n)
+    C.count.found, C.at.before[:] = n, (3, 0, -1, 4, 1)
+    normal = normal[C.at.before[:]]
     tangents()
     warm_start(C, P, X, now, before)
-    old = C.at[:, BEFORE] >= 0
-    assert world()[:, old] == pytest.approx(was[:, C.at[old, BEFORE]], abs=1e-14)
+    old = C.at.before[:] >= 0
+    assert world()[:, old] == pytest.approx(was[:, C.at.before[old]], abs=1e-14)
     assert not X.p[~old].any()
     assert not X.torque[~old].any()

@@ -14,7 +14,6 @@ from flyball.expression_graph.tracing import object_tables, trace_equations
 from flyball.model.contact import has_contact
 from flyball.tables.coordinate_choice import spanning_joints
 from flyball.tables.structure_definition import velocity_names
-from flyball.tables.table_definitions import LOAD
 from tests import mechanisms
 from tests.contract import zoo
 from tests.examples.test_examples import EQUATIONS
@@ -46,7 +45,7 @@ def engine_at(c, rng):
     state = {"t": t} | {f"z[{k}]": x for k, x in enumerate(z)}
     state |= {f"q[{k}]": x for k, x in enumerate(W.y[0, : s.nq])}
     state |= {f"v[{k}]": x for k, x in enumerate(W.y[0, s.nq : s.nq + s.nv])}
-    state |= {f"load[{k}]": x for k, x in enumerate(W.sensed[LOAD, 2 * nm :])}
+    state |= {f"load[{k}]": x for k, x in enumerate(W.sensed.load[2 * nm :])}
     M = np.zeros((s.nv, s.nv))
     i, j, _ = c.values.system.mass_entries
     M[i, j] = M[j, i] = W.M

@@ -38,21 +38,20 @@ from ..math.scalar import choose
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (
     ARTICULATED,
-    BIAS,
     COUPLED,
     LAW_INPUT,
-    LOAD,
     LOADED,
-    RATE,
     ROW_RESIDUAL,
     SCHUR,
     TERMS,
-    VALUE,
+    Sensed,
     System,
     Work,
     with_numbers,
 )
 
+ROW = {name: first for name, (first, _) in Sensed.layout.entries.items()}
+"""Rows of `Work.sensed` by name."""
 PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that may be fixed in the code
 SOLVES = (
     "STEP",
@@ -317,12 +316,12 @@ class MechanismProcedures(SolveProcedures):
     def placed(self) -> None:
         """Add poses and rows."""
         nm, nr = self.nm, self.nr
-        reads = self.fresh("sensed", VALUE, range(nm, 2 * nm))  # rates, as last measured
+        reads = self.fresh("sensed", ROW["value"], range(nm, 2 * nm))  # rates, as last measured
         update_positions(self.S, self.W, self.t, self.q, self.z)
         rows = range(nr)
         stores = [x for name in ("value", "nu", "nu_dot") for x in self.stored(f"rows.{name}", None, rows)]
         stores += [(self.at("G", e), x) for e, x in enumerate(self.W.G)]
-        stores += self.stored("sensed", VALUE, range(nm))
+        stores += self.stored("sensed", ROW["value"], range(nm))
         stores += [(self.at("T", k, c), x) for (k, c), x in np.ndenumerate(self.W.T)]
         stores += [(self.at("FK", *e), self.W.FK[e]) for e in self.read_by_others if e[1] < 12]
         reads |= {**self.given("a", self.q), **self.given("b", self.z), **self.time}
@@ -384,7 +383,7 @@ class MechanismProcedures(SolveProcedures):
             return []
         T, lam, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
                           for n, x in (("T", W.T), ("lam", W.rows.multiplier), ("sensed", W.sensed)))  # fmt: skip
-        reaction_loads(self.S, W._replace(T=T, rows=W.rows._replace(multiplier=lam), sensed=sensed))
+        reaction_loads(self.S, W._replace(T=T, rows=W.rows._replace(multiplier=lam), sensed=sensed.view(Sensed)))
         return list(sensed.ravel())
 
     def moved(self) -> None:
@@ -392,15 +391,15 @@ class MechanismProcedures(SolveProcedures):
         nm = self.nm
         update_velocities(self.S, self.W, self.t, self.v, self.z)
         stores = self.stored("rows.gamma", None, range(self.nr))
-        stores += self.stored("sensed", RATE, range(nm)) + self.stored("sensed", BIAS, range(nm))
-        stores += self.stored("sensed", VALUE, range(nm, 2 * nm))
+        stores += self.stored("sensed", ROW["rate"], range(nm)) + self.stored("sensed", ROW["bias"], range(nm))
+        stores += self.stored("sensed", ROW["value"], range(nm, 2 * nm))
         stores += [(self.at("FK", *e), self.W.FK[e]) for e in (*self.read_by_others, *self.read_at_ends) if e[1] >= 12]
         self.add("MOVE", {**self.given("a", self.v), **self.given("b", self.z), **self.time}, stores)
 
     def loaded(self) -> None:
         """Add generalised forces."""
         nm = self.nm
-        reads = self.fresh("sensed", LOAD, range(2 * nm, loads_end(self.S, self.W)))
+        reads = self.fresh("sensed", ROW["load"], range(2 * nm, loads_end(self.S, self.W)))
         rates = np.full(len(self.z), None, object)
         apply_all_forces(self.S, self.W, self.t, None, rates)
         stores = self.stored("velocities.applied", None, range(self.nv))
@@ -429,7 +428,7 @@ class MechanismProcedures(SolveProcedures):
         """Add the laws that may act briefly within a step, one by one."""
         S, W = self.S, self.W
         sensed = np.full((3, 2 * self.nm), None, object)
-        sensed[VALUE] = values = self.numbered("within", 2 * self.nm)
+        sensed[0] = values = self.numbered("within", 2 * self.nm)
         inputs = (self.t, *self.numbered("input", 2))
         forces = LAWS * len(S.forces.F)
         self.laws: list[str] = []

@@ -11,65 +11,53 @@ import numpy as np
 from ..compiler.kernels import Kernel
 from ..errors import ModelError
 from .broad_phase.workspace import (
-    BOUNDED,
-    CLASSES_EXACT,
-    COUNTS,
     IS_GENERIC,
     IS_PLANE,
     MAX_CLASSES,
-    NARROW_PHASE,
-    PAIRS_IN_LIST,
-    REALS,
     SIZE_LEVELS,
-    SLOT_CLASS,
-    SLOT_FORM,
-    SLOT_MOVER,
-    SLOT_SHAPE,
-    SPHERE_RADIUS,
-    TYPICAL_RADIUS,
-    WIDE,
+    Bounds,
+    Envelopes,
+    LevelCells,
+    LevelGrid,
+    Motions,
+    MovingFrame,
+    PairTable,
+    Planes,
     Search,
+    SearchCounts,
+    SearchReals,
+    SizeGroups,
+    SlotPairs,
+    Slots,
 )
 from .contact_search import REBUILD, STEP, search
 from .narrow_phase.primitives import SCRATCH_ROWS
 from .shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, PLANE, POLYGON, SPHERE
 from .tables import (
-    AHEAD,
-    AXES,
-    COUNT,
     DONE,
-    FIRST,
-    FOUND,
     FULL_CONTACTS,
     FULL_PAIRS,
-    KIND,
-    MARGIN,
-    MASK,
-    MEMBER,
-    MOVER,
     NOT_FINITE,
-    PAR,
-    PLACE,
-    RADIUS,
-    SKIN,
+    ContactCounts,
     Contacts,
     Geometry,
     Movers,
+    no_contacts,
 )
 
 
-def bounding_volumes(G: Geometry) -> np.ndarray:
+def bounding_volumes(G: Geometry) -> Bounds:
     """Bounding sphere and box of every shape, with a common centre.
 
     A kind without a rule here gets those of the sphere given in the table.
 
     Returns
     -------
-    ndarray (ns, 8)
+    Bounds
         Centre [m] in the mover's axes, radius [m] (inf for unbounded shapes), half edges of the box [m] along the
-        shape's axes. For unbounded shapes the fifth number is the greatest height along the shape's z axis.
+        shape's axes. For unbounded shapes the first half edge is the greatest height along the shape's z axis.
     """
-    kind, par, radius = G.shape_i[:, KIND], G.shape_x[:, PAR : PAR + 3], G.shape_x[:, RADIUS]
+    kind, par, radius = G.shape.kind[:], G.dimensions.par[:, :3], G.dimensions.radius[:]
     middle, wide = np.zeros((len(kind), 3)), ~np.isfinite(radius)
     half = np.repeat(np.where(wide, 0.0, radius)[:, None], 3, axis=1)
     size = np.full(len(kind), np.inf)
@@ -78,20 +66,20 @@ def bounding_volumes(G: Geometry) -> np.ndarray:
     middle[kind == CONE, 2] = 0.5 * par[kind == CONE, 1]
     middle[kind == HEMISPHERE, 2] = 0.5 * par[kind == HEMISPHERE, 0]
     for i in np.flatnonzero((kind == HULL) | (kind == POLYGON)):
-        first, count = G.shape_i[i, [FIRST, COUNT]]
+        first, count = G.shape.first[i], G.shape.count[i]
         vertices = G.vertex[first : first + count]
         low, high = vertices.min(0), vertices.max(0)
         middle[i], half[i] = 0.5 * (low + high), 0.5 * (high - low) + par[i, 0]
         size[i] = np.linalg.norm(vertices - middle[i], axis=1).max() + par[i, 0]
     for i in np.flatnonzero((kind == FIELD) & wide):
-        heights = G.vertex[G.shape_i[i, FIRST] :].ravel()[: int(par[i, 0] * par[i, 1])]
+        heights = G.vertex[G.shape.first[i] :].ravel()[: int(par[i, 0] * par[i, 1])]
         half[i, 0] = heights.max()
-    out = np.zeros((len(kind), 8))
-    axes = G.shape_x[:, AXES : AXES + 9].reshape(-1, 3, 3)
-    out[:, :3] = G.shape_x[:, PLACE : PLACE + 3] + np.einsum("nij,nj->ni", axes, middle)
+    out = Bounds.blank(len(kind))
+    axes = G.dimensions.axes.reshape(-1, 3, 3)
+    out.centre = G.dimensions.place + np.einsum("nij,nj->ni", axes, middle)
     size = np.minimum(size, np.minimum(np.linalg.norm(half, axis=1), radius + np.linalg.norm(middle, axis=1)))
-    out[:, 3] = np.where(wide, np.inf, np.where(kind == SPHERE, par[:, 0], size))
-    out[:, 4:7] = half
+    out.radius = np.where(wide, np.inf, np.where(kind == SPHERE, par[:, 0], size))
+    out.half_edges = half
     return out
 
 
@@ -119,8 +107,8 @@ def collision_classes(G: Geometry) -> tuple[np.ndarray, np.ndarray, bool]:
         Whether classes represent all groups. If there are too many combinations of groups, classes only separate fixed
         from movable shapes.
     """
-    member, mask = G.shape_i[:, MEMBER], G.shape_i[:, MASK]
-    still = (G.shape_i[:, MOVER] < 0).astype(np.int64)
+    member, mask = G.shape.member[:], G.shape.mask[:]
+    still = (G.shape.mover[:] < 0).astype(np.int64)
     (of, one), (to, other) = np.unique(member, return_inverse=True), np.unique(mask, return_inverse=True)
     codes, kin = np.unique((one * len(to) + other) * 2 + still, return_inverse=True)
     exact = len(codes) <= MAX_CLASSES
@@ -139,11 +127,6 @@ PAIR_LIMIT_PER_SHAPE, PAIR_LIMIT = (
 SKIN_RATIO = 0.1  # skin thickness relative to the radius
 
 
-def no_contacts(capacity: int) -> Contacts:
-    """Create an empty table of contacts."""
-    return Contacts(np.zeros(8, np.int64), np.full((capacity, 4), -1, np.int64), np.zeros((capacity, 10)))
-
-
 def no_movers(count: int) -> Movers:
     """Create movers at the origin, at rest."""
     pose = np.zeros((count, 12))
@@ -156,55 +139,58 @@ def _power_of_two(least: int) -> int:
     return 1 << max(4, int(least - 1).bit_length())
 
 
-def _pair_hash_table(contacts: int) -> dict[str, np.ndarray]:
+def _pair_hash_table(contacts: int) -> PairTable:
     """Create a hash table of pairs that this many contacts fill at most by half."""
     n = _power_of_two(2 * contacts)
-    return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int64), "taken": np.zeros(n // 2, np.int64)}
+    return PairTable(np.full(n, -1, np.int64), np.zeros(n, np.int64), np.zeros(n // 2, np.int64))
 
 
 def search_workspace(G: Geometry, pairs: int, contacts: int) -> Search:
     """Create the tables of the search, with initial capacities for pairs and contacts."""
-    ns, hold = len(G.shape_i), bounding_volumes(G)
-    bounded = np.isfinite(hold[:, 3])
+    ns, hold = len(G.shape), bounding_volumes(G)
+    bounded = np.isfinite(hold.radius)
     kin, meets, exact = collision_classes(G)
-    real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
-    moving = bounded & (G.shape_i[:, MOVER] >= 0)
-    usual = hold[moving if moving.any() else bounded, 3]
-    real[TYPICAL_RADIUS] = (np.median(usual) if len(usual) else 0.0) or 1.0
-    count[[BOUNDED, WIDE, CLASSES_EXACT]] = bounded.sum(), ns - bounded.sum(), exact
-    slot = np.zeros((ns, 5), np.int64)
+    real, count = SearchReals.blank(), SearchCounts.blank()
+    moving = bounded & (G.shape.mover[:] >= 0)
+    usual = hold.radius[moving if moving.any() else bounded]
+    real.typical_radius = (np.median(usual) if len(usual) else 0.0) or 1.0
+    count.bounded, count.wide, count.classes_exact = bounded.sum(), ns - bounded.sum(), exact
+    slot = Slots.blank(ns)
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
-        form = IS_PLANE if G.shape_i[i, KIND] == PLANE else IS_GENERIC
-        slot[s, [SLOT_SHAPE, SLOT_MOVER, SLOT_FORM, SLOT_CLASS]] = i, G.shape_i[i, MOVER], form, kin[i]
-    turning = ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0
-    now = np.zeros((ns, 8))
-    now[bounded.sum() :, SPHERE_RADIUS] = np.inf
+        form = IS_PLANE if G.shape.kind[i] == PLANE else IS_GENERIC
+        slot[s] = i, G.shape.mover[i], 0, form, kin[i]
+    turning = ns if (G.shape.kind[bounded] != SPHERE).any() else 0
+    now = Motions.blank(ns)
+    now.radius[bounded.sum() :] = np.inf
     return Search(
         real=real,
+        frame=MovingFrame.blank(),
         count=count,
         hold=hold,
         shape_class=np.where(bounded, kin, -1),
         meets=meets,
         slot=slot,
         now=now,
-        envelope=np.zeros((ns, 8)),
+        envelope=Envelopes.blank(ns),
         axes=np.zeros((turning, 9)),
         turn=np.zeros((turning, 9)),
-        wide=np.zeros((ns - int(bounded.sum()), 20)),
-        raw=np.zeros((ns, 18)),
+        wide=Planes.blank(ns - int(bounded.sum())),
+        raw_now=Motions.blank(ns),
+        raw_envelope=Envelopes.blank(ns),
+        raw_bound=np.zeros(ns),
         key=np.zeros(ns, np.int64),
         link=np.zeros(ns, np.int64),
         head=np.zeros(4 * ns + 2 * len(meets) * SIZE_LEVELS + 2, np.int64),
-        level_i=np.zeros((len(meets) * SIZE_LEVELS, 6), np.int64),
-        level_x=np.zeros((len(meets) * SIZE_LEVELS, 8)),
-        sums=np.zeros((len(meets) * SIZE_LEVELS, 10)),
-        pair=np.zeros((pairs, 3), np.int32),
+        level_cells=LevelCells.blank(len(meets) * SIZE_LEVELS),
+        level_grid=LevelGrid.blank(len(meets) * SIZE_LEVELS),
+        sums=SizeGroups.blank(len(meets) * SIZE_LEVELS),
+        pair=SlotPairs.blank(pairs),
         seen=np.full((2, pairs), -1, np.int32),
         mark=np.zeros(ns, np.int64),
         moved=np.zeros(ns, np.int64),
         room=np.zeros((SCRATCH_ROWS, 8)),
         kept=np.zeros((2, 12)),
-        **_pair_hash_table(contacts),
+        table=_pair_hash_table(contacts),
     )
 
 
@@ -212,7 +198,7 @@ def narrow_phase_kernel(G: Geometry) -> Kernel:
     """Narrow-phase kernel for the kinds of these shapes; `no_pair_contacts` if no pair needs it."""
     from .narrow_phase.dispatch import kernel_for_kinds, no_pair_contacts
 
-    kind, bounded = G.shape_i[:, KIND], np.isfinite(bounding_volumes(G)[:, 3])
+    kind, bounded = G.shape.kind[:], np.isfinite(bounding_volumes(G).radius)
     simple = (kind == SPHERE) | (~bounded & (kind == PLANE))
     return no_pair_contacts if simple.all() else kernel_for_kinds(set(kind.tolist()))
 
@@ -247,12 +233,13 @@ class ContactFinder:
     def __init__(
         self, geometry: Geometry, *, margin: float = 0.0, ahead: float = 0.0, skin: float = SKIN_RATIO
     ) -> None:
-        ns = len(geometry.shape_i)
+        ns = len(geometry.shape)
         self.geometry = geometry
         self.now, self.before, self.midway = (no_contacts(4 * ns + 64) for _ in range(3))
         self.search = search_workspace(geometry, 8 * ns + 64, 4 * ns + 64)
-        self.search.real[[MARGIN, SKIN, AHEAD]] = margin, skin, ahead
-        self.search.count[NARROW_PHASE] = narrow_phase_kernel(geometry).address
+        real = self.search.real
+        real.margin, real.skin, real.ahead = margin, skin, ahead
+        self.search.count.narrow_phase = narrow_phase_kernel(geometry).address
         self.address = search.address
 
     def find(self, movers: Movers, rebuild: bool = False) -> Contacts:
@@ -279,14 +266,14 @@ class ContactFinder:
             self.enlarge(status, self.before.count)
             self.now, self.before = self.before, self.now
 
-    def enlarge(self, status: int, count: np.ndarray) -> None:
+    def enlarge(self, status: int, count: ContactCounts) -> None:
         """Enlarge the table that a search reported as full; the new tuples are in the attributes.
 
         Parameters
         ----------
         status : int
             Status returned by the search.
-        count : ndarray
+        count : ContactCounts
             ``count`` of the contacts that the search filled.
 
         Raises
@@ -296,21 +283,21 @@ class ContactFinder:
         """
         if status == NOT_FINITE:
             raise ModelError(
-                f"mover {count[FOUND]} has a position, orientation or velocity that is not a finite number: the motion "
+                f"mover {count.found} has a position, orientation or velocity that is not a finite number: the motion "
                 "has failed before contacts were looked for (a smaller step, or check masses and forces)"
             )
         if status == FULL_CONTACTS:
-            capacity = int(1.5 * count[FOUND]) + 64
+            capacity = int(1.5 * count.found) + 64
             self.now, self.before = _enlarged_contacts(self.now, capacity), _enlarged_contacts(self.before, capacity)
             self.midway = no_contacts(capacity)
-            self.search = self.search._replace(**_pair_hash_table(capacity))
+            self.search = self.search._replace(table=_pair_hash_table(capacity))
         elif status == FULL_PAIRS:
             self._more_pairs()
         else:
             raise ValueError(f"status {status} is no status of a full table")
 
     def _more_pairs(self) -> None:
-        B, ns = self.search, len(self.geometry.shape_i)
+        B, ns = self.search, len(self.geometry.shape)
         capacity = len(B.pair)
         most = max(PAIR_LIMIT_PER_SHAPE * ns, PAIR_LIMIT)
         if capacity >= most:
@@ -321,18 +308,18 @@ class ContactFinder:
                 "that may go through each other"
             )
         larger = min(2 * capacity, most)
-        pair, seen = np.zeros((larger, 3), np.int32), np.full((2, larger), -1, np.int32)
+        pair, seen = SlotPairs.blank(larger), np.full((2, larger), -1, np.int32)
         pair[:capacity], seen[:, :capacity] = B.pair, B.seen
         self.search = B._replace(pair=pair, seen=seen)
 
     def most_pairs(self) -> tuple[int, int]:
         """Shape with the most pairs in the list, and their number."""
         B = self.search
-        slots = B.pair[: B.count[PAIRS_IN_LIST], :2].ravel()
+        slots = np.concatenate([B.pair.first[: B.count.pairs], B.pair.second[: B.count.pairs]])
         if not len(slots):
             return 0, 0
         many = np.bincount(slots)
-        return int(B.slot[many.argmax(), SLOT_SHAPE]), int(many.max())
+        return int(B.slot.shape_index[many.argmax()]), int(many.max())
 
 
 def _enlarged_contacts(C: Contacts, capacity: int) -> Contacts:

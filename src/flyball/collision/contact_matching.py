@@ -7,8 +7,6 @@ contacts are matched by feature, otherwise by distance.
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from .broad_phase.workspace import TABLE_PAIRS
-from .tables import FEATURE, FOUND, POINT, SHAPE_1, SHAPE_2
 
 EMPTY_PLACE = -1
 MATCHING_DISTANCE = (
@@ -33,38 +31,38 @@ def table_place(names, i, j, name):
 def store_pair(B, i, j, first):
     """Store a pair of shapes and its first contact in the table."""
     name = i * B.shape_class.shape[0] + j
-    k = table_place(B.names, i, j, name)
-    if B.names[k] == EMPTY_PLACE:
-        B.names[k], B.firsts[k] = name, first
-        B.taken[B.count[TABLE_PAIRS]] = k
-        B.count[TABLE_PAIRS] += 1
+    k = table_place(B.table.names, i, j, name)
+    if B.table.names[k] == EMPTY_PLACE:
+        B.table.names[k], B.table.firsts[k] = name, first
+        B.table.taken[B.count.table_pairs] = k
+        B.count.table_pairs += 1
 
 
 @formula
 def stored_contact(B, i, j):
     """First contact of a pair, or -1."""
-    if B.count[TABLE_PAIRS] == 0:
+    if B.count.table_pairs == 0:
         return -1
     name = i * B.shape_class.shape[0] + j
-    k = table_place(B.names, i, j, name)
-    return B.firsts[k] if B.names[k] == name else -1
+    k = table_place(B.table.names, i, j, name)
+    return B.table.firsts[k] if B.table.names[k] == name else -1
 
 
 @formula
 def clear_table(B):
     """Empty the table."""
-    for k in range(B.count[TABLE_PAIRS]):
-        B.names[B.taken[k]] = EMPTY_PLACE
-    B.count[TABLE_PAIRS] = 0
+    for k in range(B.count.table_pairs):
+        B.table.names[B.table.taken[k]] = EMPTY_PLACE
+    B.count.table_pairs = 0
 
 
 @formula
 def store_all_pairs(O, B):
     """Store all pairs that have contacts in O in the table."""
     i, j = -1, -1
-    for c in range(O.count[FOUND]):
-        if O.at[c, SHAPE_1] != i or O.at[c, SHAPE_2] != j:
-            i, j = O.at[c, SHAPE_1], O.at[c, SHAPE_2]
+    for c in range(O.count.found):
+        if O.at.shape_1[c] != i or O.at.shape_2[c] != j:
+            i, j = O.at.shape_1[c], O.at.shape_2[c]
             store_pair(B, i, j, c)
 
 
@@ -74,20 +72,20 @@ def matching_contact(O, pair, first, feature, point, size, used):
 
     Returns its index and its bit, or -1 and 0.
     """
-    end, best, bit = O.count[FOUND], -1, 0
+    end, best, bit = O.count.found, -1, 0
     c = first
-    while 0 <= c < end and c - first < 62 and O.at[c, SHAPE_1] == pair[0] and O.at[c, SHAPE_2] == pair[1]:
+    while 0 <= c < end and c - first < 62 and O.at.shape_1[c] == pair[0] and O.at.shape_2[c] == pair[1]:
         b = 1 << (c - first)
-        if O.at[c, FEATURE] == feature and used & b == 0:
+        if O.at.feature[c] == feature and used & b == 0:
             return c, b
         c += 1
     least = (MATCHING_DISTANCE * size) ** 2
     for k in range(max(0, c - first)):
         b = 1 << k
         if used & b == 0:
-            x = O.x[first + k, POINT] - point[0]
-            y = O.x[first + k, POINT + 1] - point[1]
-            z = O.x[first + k, POINT + 2] - point[2]
+            x = O.x.point[first + k, 0] - point[0]
+            y = O.x.point[first + k, 1] - point[1]
+            z = O.x.point[first + k, 2] - point[2]
             d = x * x + y * y + z * z
             if d < least:
                 least, best, bit = d, first + k, b

@@ -11,7 +11,7 @@ systems", 2.3), because the nearest points of distant shapes are not those where
 
 `C` receives the contacts for the poses in `M`; `O` holds those of the last search that returned `DONE` (the two
 are exchanged from step to step). With status `FULL_*` or `NOT_FINITE`, `O` and the workspace are unchanged:
-the caller enlarges the table (`ContactFinder.enlarge`) and calls again. ``C.count[FOUND]`` is the number of
+the caller enlarges the table (`ContactFinder.enlarge`) and calls again. ``C.count.found`` is the number of
 contacts (with FULL_CONTACTS: the required number; with NOT_FINITE: the mover). Poses in `M` may change
 while the search runs; they are restored.
 """
@@ -34,62 +34,18 @@ from .broad_phase.envelopes import (
 )
 from .broad_phase.pair_list import drop_moved, list_all, list_moved, renew_envelope
 from .broad_phase.workspace import (
-    BOUNDED,
-    CENTRE,
-    CURRENT_HALF,
-    DISPLACEMENT,
-    FRAME_ORIGIN,
-    FRAME_STEP,
-    FRAME_VELOCITY,
     GENERIC_PAIR,
     IS_PLANE,
-    LIST_VALID,
-    MOVED_SLOTS,
-    NARROW_PHASE,
-    PAIRS_AT_REBUILD,
-    PAIRS_EXAMINED,
-    PAIRS_IN_LIST,
-    PLANE_NORMAL,
-    PLANE_ORIGIN,
-    PLANE_SPIN,
-    PLANE_VELOCITY,
-    QUERY_REACH,
-    QUERY_SHAPE_1,
-    QUERY_SHAPE_2,
-    REBUILDS,
-    SEARCHES,
-    SLOT_FORM,
-    SLOT_MOVER,
-    SLOT_SHAPE,
     SPHERE_PLANE,
-    SPHERE_RADIUS,
     SPHERE_SPHERE,
-    TURNING_SPEED,
-    VELOCITY,
-    WIDE,
     Search,
 )
 from .contact_matching import clear_table, matching_contact, store_all_pairs
 from .tables import (
-    AHEAD,
-    APART,
-    BEFORE,
     DONE,
-    FEATURE,
-    FOUND,
     FULL_CONTACTS,
     FULL_PAIRS,
-    GAP,
-    MARGIN,
-    NORMAL,
     NOT_FINITE,
-    NUMBER,
-    PAIRS,
-    POINT,
-    REBUILT,
-    SHAPE_1,
-    SHAPE_2,
-    STATUS,
     Contacts,
     Geometry,
     Movers,
@@ -100,17 +56,17 @@ from .tables import (
 def write_contact(C, n, point, normal, gap, offset):
     """Write row n of the contacts, if the table has one."""
     if n < C.x.shape[0]:
-        C.x[n, POINT], C.x[n, POINT + 1], C.x[n, POINT + 2] = point
-        C.x[n, NORMAL], C.x[n, NORMAL + 1], C.x[n, NORMAL + 2] = normal
-        C.x[n, GAP] = gap
-        C.x[n, APART], C.x[n, APART + 1], C.x[n, APART + 2] = offset
+        C.x.point[n, 0], C.x.point[n, 1], C.x.point[n, 2] = point
+        C.x.normal[n, 0], C.x.normal[n, 1], C.x.normal[n, 2] = normal
+        C.x.gap[n] = gap
+        C.x.apart[n, 0], C.x.apart[n, 1], C.x.apart[n, 2] = offset
 
 
 @formula
 def write_contact_identity(C, n, i, j, feature, first):
     """Write the shapes and the feature of contact n, and its index in the last search."""
     if n < C.at.shape[0]:
-        C.at[n, SHAPE_1], C.at[n, SHAPE_2], C.at[n, FEATURE], C.at[n, BEFORE] = i, j, feature, first
+        C.at.shape_1[n], C.at.shape_2[n], C.at.feature[n], C.at.before[n] = i, j, feature, first
 
 
 @formula
@@ -132,31 +88,31 @@ def approach_time(d, r, reach, u, horizon):
 def sphere_sphere_contact(C, B, s, t, n):
     """Write the contact of two spheres to row n; returns the number of contacts.
 
-    Spheres whose surfaces come within the margin in `AHEAD` seconds, with their velocities or if one of them is
+    Spheres whose surfaces come within the margin in ``ahead`` seconds, with their velocities or if one of them is
     stopped, have a contact: along the normal at the instant at which they will (first) be nearest, with the present gap
     between their tangent planes across it. A sphere that passes another one has no contact with it.
     """
     now, far = B.now, 0.0
     x, y, z = (
-        now[t, CENTRE] - now[s, CENTRE],
-        now[t, CENTRE + 1] - now[s, CENTRE + 1],
-        now[t, CENTRE + 2] - now[s, CENTRE + 2],
+        now.centre[t, 0] - now.centre[s, 0],
+        now.centre[t, 1] - now.centre[s, 1],
+        now.centre[t, 2] - now.centre[s, 2],
     )
-    r = now[s, SPHERE_RADIUS] + now[t, SPHERE_RADIUS]
-    reach = r + B.real[MARGIN]
+    r = now.radius[s] + now.radius[t]
+    reach = r + B.real.margin
     d2 = x * x + y * y + z * z
     a, b, c = x, y, z
     if d2 >= reach * reach:
-        D = (B.real[FRAME_VELOCITY], B.real[FRAME_VELOCITY + 1], B.real[FRAME_VELOCITY + 2])
-        v, w = sub(load3(now, s, VELOCITY), D), sub(load3(now, t, VELOCITY), D)
+        D = (B.frame.velocity[0], B.frame.velocity[1], B.frame.velocity[2])
+        v, w = sub(load3(now.velocity, s, 0), D), sub(load3(now.velocity, t, 0), D)
         u = sub(w, v)
-        time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+        time = approach_time((x, y, z), r, reach, u, B.real.ahead)
         if time < 0.0:
             u = w
-            time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+            time = approach_time((x, y, z), r, reach, u, B.real.ahead)
         if time < 0.0:
             u = scale(-1.0, v)
-            time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+            time = approach_time((x, y, z), r, reach, u, B.real.ahead)
         if time < 0.0:
             return 0
         a, b, c = x + time * u[0], y + time * u[1], z + time * u[2]
@@ -168,18 +124,18 @@ def sphere_sphere_contact(C, B, s, t, n):
     else:
         a, b, c = 1.0, 0.0, 0.0
     gap = d - r if far == 0.0 else a * x + b * y + c * z - r
-    p = now[s, SPHERE_RADIUS] - 0.5 * r
+    p = now.radius[s] - 0.5 * r
     point = (
-        now[s, CENTRE] + 0.5 * x + p * a,
-        now[s, CENTRE + 1] + 0.5 * y + p * b,
-        now[s, CENTRE + 2] + 0.5 * z + p * c,
+        now.centre[s, 0] + 0.5 * x + p * a,
+        now.centre[s, 1] + 0.5 * y + p * b,
+        now.centre[s, 2] + 0.5 * z + p * c,
     )
     # half the distance of the centres across the normal: each sphere is touched on the line through its own centre
     along = 0.5 * (a * x + b * y + c * z)
     apart = 0.5 * x - along * a, 0.5 * y - along * b, 0.5 * z - along * c
-    if B.slot[t, SLOT_MOVER] < 0:
+    if B.slot.mover[t] < 0:
         point, apart = sub(point, apart), (0.0, 0.0, 0.0)
-    elif B.slot[s, SLOT_MOVER] < 0:
+    elif B.slot.mover[s] < 0:
         point, apart = add(point, apart), (0.0, 0.0, 0.0)
     write_contact(C, n, point, (a, b, c), gap, apart)
     return 1
@@ -188,24 +144,24 @@ def sphere_sphere_contact(C, B, s, t, n):
 @formula
 def plane_sphere_contact(C, B, w, s, side, n):
     """Write the contact of wide slot w, a plane, and slot s, a sphere; ``side`` is -1 if the sphere is shape 1."""
-    k = w - B.count[BOUNDED]
+    k = w - B.count.bounded
     q = B.wide
     x = (
-        B.now[s, CENTRE] - q[k, PLANE_ORIGIN],
-        B.now[s, CENTRE + 1] - q[k, PLANE_ORIGIN + 1],
-        B.now[s, CENTRE + 2] - q[k, PLANE_ORIGIN + 2],
+        B.now.centre[s, 0] - q.origin[k, 0],
+        B.now.centre[s, 1] - q.origin[k, 1],
+        B.now.centre[s, 2] - q.origin[k, 2],
     )
-    a, b, c = q[k, PLANE_NORMAL], q[k, PLANE_NORMAL + 1], q[k, PLANE_NORMAL + 2]
-    gap = a * x[0] + b * x[1] + c * x[2] - B.now[s, SPHERE_RADIUS]
-    if gap >= B.real[MARGIN]:
-        u = (q[k, PLANE_SPIN], q[k, PLANE_SPIN + 1], q[k, PLANE_SPIN + 2])
-        closing = a * (q[k, PLANE_VELOCITY] + u[1] * x[2] - u[2] * x[1] - B.now[s, VELOCITY])
-        closing += b * (q[k, PLANE_VELOCITY + 1] + u[2] * x[0] - u[0] * x[2] - B.now[s, VELOCITY + 1])
-        closing += c * (q[k, PLANE_VELOCITY + 2] + u[0] * x[1] - u[1] * x[0] - B.now[s, VELOCITY + 2])
-        if gap >= B.real[MARGIN] + closing * B.real[AHEAD]:
+    a, b, c = q.normal[k, 0], q.normal[k, 1], q.normal[k, 2]
+    gap = a * x[0] + b * x[1] + c * x[2] - B.now.radius[s]
+    if gap >= B.real.margin:
+        u = (q.spin[k, 0], q.spin[k, 1], q.spin[k, 2])
+        closing = a * (q.velocity[k, 0] + u[1] * x[2] - u[2] * x[1] - B.now.velocity[s, 0])
+        closing += b * (q.velocity[k, 1] + u[2] * x[0] - u[0] * x[2] - B.now.velocity[s, 1])
+        closing += c * (q.velocity[k, 2] + u[0] * x[1] - u[1] * x[0] - B.now.velocity[s, 2])
+        if gap >= B.real.margin + closing * B.real.ahead:
             return 0
-    p = B.now[s, SPHERE_RADIUS] + 0.5 * gap
-    point = (B.now[s, CENTRE] - p * a, B.now[s, CENTRE + 1] - p * b, B.now[s, CENTRE + 2] - p * c)
+    p = B.now.radius[s] + 0.5 * gap
+    point = (B.now.centre[s, 0] - p * a, B.now.centre[s, 1] - p * b, B.now.centre[s, 2] - p * c)
     write_contact(C, n, point, (side * a, side * b, side * c), gap, (0.0, 0.0, 0.0))
     return 1
 
@@ -245,12 +201,12 @@ def advance_pose(M, B, row, m, time):
 @formula
 def query_narrow_phase(G, M, B, s, t, reach):
     """Find contacts of a pair of slots at the present poses, up to this gap; writes ``room``, returns their number."""
-    B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH] = (
-        B.slot[s, SLOT_SHAPE],
-        B.slot[t, SLOT_SHAPE],
+    B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach = (
+        B.slot.shape_index[s],
+        B.slot.shape_index[t],
         reach,
     )
-    return call(B.count[NARROW_PHASE], G, M, B, B, B, 0)
+    return call(B.count.narrow_phase, G, M, B, B, B, 0)
 
 
 @formula
@@ -266,25 +222,25 @@ def smallest_gap(B, found):
 @formula
 def closing_speed(B, s, t, k):
     """Largest speed at which two bounded shapes can approach along the normal of contact k."""
-    v = B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED]
+    v = B.now.turning_speed[s] + B.now.turning_speed[t]
     for c in range(3):
-        v += B.room[k, 3 + c] * (B.now[s, VELOCITY + c] - B.now[t, VELOCITY + c])
+        v += B.room[k, 3 + c] * (B.now.velocity[s, c] - B.now.velocity[t, c])
     return v
 
 
 @formula
 def advance_to_touch(G, M, B, s, t, reach, size):
-    """Find contacts where a fast pair first touches within `AHEAD` seconds: their number, and the time.
+    """Find contacts where a fast pair first touches within ``ahead`` seconds: their number, and the time.
 
-    They are in ``room``, the poses at that time in M; `restore_pose` restores these. ``reach``: `MARGIN` plus the
+    They are in ``room``, the poses at that time in M; `restore_pose` restores these. ``reach``: ``margin`` plus the
     largest displacement.
     """
-    a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
-    ahead, time = B.real[AHEAD], 0.0
-    fastest = (reach - B.real[MARGIN]) / ahead
-    enough = B.real[MARGIN] + TOUCHING_GAP * size
+    a, b = B.slot.mover[s], B.slot.mover[t]
+    ahead, time = B.real.ahead, 0.0
+    fastest = (reach - B.real.margin) / ahead
+    enough = B.real.margin + TOUCHING_GAP * size
     for _ in range(MAX_ADVANCES):
-        found = query_narrow_phase(G, M, B, s, t, B.real[MARGIN] + fastest * (ahead - time))
+        found = query_narrow_phase(G, M, B, s, t, B.real.margin + fastest * (ahead - time))
         if found == 0:
             return 0, time
         k = smallest_gap(B, found)
@@ -292,9 +248,9 @@ def advance_to_touch(G, M, B, s, t, reach, size):
         if gap <= enough:
             return found, time
         speed = fastest
-        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:
+        if s < B.count.bounded and t < B.count.bounded:
             speed = min(fastest, closing_speed(B, s, t, k))
-        if gap - B.real[MARGIN] >= speed * (ahead - time):
+        if gap - B.real.margin >= speed * (ahead - time):
             return 0, time
         time += (gap - 0.5 * enough) / speed
         if time >= ahead:
@@ -312,41 +268,39 @@ FAST_STEP = (
 @formula
 def frame_velocity(B):
     """Velocity of the frame, with which all movers move if they move together."""
-    return (B.real[FRAME_VELOCITY], B.real[FRAME_VELOCITY + 1], B.real[FRAME_VELOCITY + 2])
+    return (B.frame.velocity[0], B.frame.velocity[1], B.frame.velocity[2])
 
 
 @formula
 def largest_approach(B, s, t):
-    """Largest decrease of the distance of two bounded slots in `AHEAD` seconds."""
-    u = norm(sub(load3(B.now, t, VELOCITY), load3(B.now, s, VELOCITY)))
-    return B.real[AHEAD] * (u + B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED])
+    """Largest decrease of the distance of two bounded slots in ``ahead`` seconds."""
+    u = norm(sub(load3(B.now.velocity, t, 0), load3(B.now.velocity, s, 0)))
+    return B.real.ahead * (u + B.now.turning_speed[s] + B.now.turning_speed[t])
 
 
 @formula
 def pair_reach(B, s, t):
-    """Largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; negative if it cannot."""
+    """Largest gap at which a pair of bounded slots may touch within ``ahead`` seconds; negative if it cannot."""
     now = B.now
-    reach = B.real[MARGIN]
+    reach = B.real.margin
     D = frame_velocity(B)
-    v, w = sub(load3(now, s, VELOCITY), D), sub(load3(now, t, VELOCITY), D)
+    v, w = sub(load3(now.velocity, s, 0), D), sub(load3(now.velocity, t, 0), D)
     u = max(norm(sub(w, v)), norm(v), norm(w))
-    d = sub(load3(now, t, CENTRE), load3(now, s, CENTRE))
-    reach += B.real[AHEAD] * (u + now[s, TURNING_SPEED] + now[t, TURNING_SPEED])
-    whole = reach + now[s, SPHERE_RADIUS] + now[t, SPHERE_RADIUS]
+    d = sub(load3(now.centre, t, 0), load3(now.centre, s, 0))
+    reach += B.real.ahead * (u + now.turning_speed[s] + now.turning_speed[t])
+    whole = reach + now.radius[s] + now.radius[t]
     return reach if dot(d, d) < whole * whole and bounds_meet(B, B.axes, s, t, d, reach) else -1.0
 
 
 @formula
 def plane_reach(M, B, w, s):
     """As `pair_reach`, for wide slot w and slot s."""
-    k = w - B.count[BOUNDED]
+    k = w - B.count.bounded
     q = B.wide
-    p, n = load3(B.now, s, CENTRE), load3(q, k, PLANE_NORMAL)
-    u = norm(sub(velocity_at_point(M, B.slot[w, SLOT_MOVER], p), load3(B.now, s, VELOCITY)))
-    gap = dot(n, sub(p, load3(q, k, PLANE_ORIGIN))) - half_extent(B, B.axes, s, n)
-    reach = B.real[MARGIN] + B.real[AHEAD] * (
-        u + B.now[s, TURNING_SPEED] + norm(load3(q, k, PLANE_SPIN)) * B.now[s, SPHERE_RADIUS]
-    )
+    p, n = load3(B.now.centre, s, 0), load3(q.normal, k, 0)
+    u = norm(sub(velocity_at_point(M, B.slot.mover[w], p), load3(B.now.velocity, s, 0)))
+    gap = dot(n, sub(p, load3(q.origin, k, 0))) - half_extent(B, B.axes, s, n)
+    reach = B.real.margin + B.real.ahead * (u + B.now.turning_speed[s] + norm(load3(q.spin, k, 0)) * B.now.radius[s])
     return -1.0 if gap > reach else reach
 
 
@@ -369,20 +323,20 @@ def accept_contacts(M, C, O, B, pair, rows, time, found):
 
     ``rows``: the pair's first contact in the last search and the next row of C. Returns their number.
     """
-    many, used, ahead = 0, 0, B.real[AHEAD]
+    many, used, ahead = 0, 0, B.real.ahead
     s, t = pair
-    i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
-    size = min(B.now[s, SPHERE_RADIUS], B.now[t, SPHERE_RADIUS])
+    i, j = B.slot.shape_index[s], B.slot.shape_index[t]
+    size = min(B.now.radius[s], B.now.radius[t])
     for k in range(found):
         p, e = load3(B.room, k, 0), load3(B.room, k, 3)
-        v, u = velocity_at_point(M, B.slot[s, SLOT_MOVER], p), velocity_at_point(M, B.slot[t, SLOT_MOVER], p)
+        v, u = velocity_at_point(M, B.slot.mover[s], p), velocity_at_point(M, B.slot.mover[t], p)
         closing = dot(e, sub(v, u))
         gap = B.room[k, 6] + time * closing
         D = frame_velocity(B)
-        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # another contact may stop one of them
+        if s < B.count.bounded and t < B.count.bounded:  # another contact may stop one of them
             closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
-        if gap < B.real[MARGIN] + ahead * max(0.0, closing):
-            p, apart = point_before_motion(M, p, B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER], time)
+        if gap < B.real.margin + ahead * max(0.0, closing):
+            p, apart = point_before_motion(M, p, B.slot.mover[s], B.slot.mover[t], time)
             feature = int(B.room[k, 7])
             c, bit = matching_contact(O, (i, j), rows[0], feature, sub(p, scale(ahead, v)), size, used)
             used |= bit
@@ -396,21 +350,21 @@ def accept_contacts(M, C, O, B, pair, rows, time, found):
 def generic_contacts(G, M, C, O, B, pair, first, n):
     """Write the contacts of any pair of slots from row n on; returns their number. ``first``: of the last search."""
     s, t = pair
-    bounded = B.count[BOUNDED]
+    bounded = B.count.bounded
     reach = pair_reach(B, s, t) if s < bounded and t < bounded else plane_reach(M, B, max(s, t), min(s, t))
     if reach < 0.0:
         return 0
-    a, b, size = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER], min(B.now[s, SPHERE_RADIUS], B.now[t, SPHERE_RADIUS])
-    flat = (s >= bounded and B.slot[s, SLOT_FORM] == IS_PLANE) or (t >= bounded and B.slot[t, SLOT_FORM] == IS_PLANE)
-    near = largest_approach(B, s, t) if s < bounded and t < bounded else reach - B.real[MARGIN]
+    a, b, size = B.slot.mover[s], B.slot.mover[t], min(B.now.radius[s], B.now.radius[t])
+    flat = (s >= bounded and B.slot.form[s] == IS_PLANE) or (t >= bounded and B.slot.form[t] == IS_PLANE)
+    near = largest_approach(B, s, t) if s < bounded and t < bounded else reach - B.real.margin
     if flat or near <= FAST_STEP * size:
         return accept_contacts(M, C, O, B, pair, (first, n), 0.0, query_narrow_phase(G, M, B, s, t, reach))
-    found = query_narrow_phase(G, M, B, s, t, B.real[MARGIN])
+    found = query_narrow_phase(G, M, B, s, t, B.real.margin)
     if found > 0:
         return accept_contacts(M, C, O, B, pair, (first, n), 0.0, query_narrow_phase(G, M, B, s, t, reach))
     store_pose(M, B, 0, a)
     store_pose(M, B, 1, b)
-    found, time = advance_to_touch(G, M, B, s, t, B.real[MARGIN] + near, size)
+    found, time = advance_to_touch(G, M, B, s, t, B.real.margin + near, size)
     found = accept_contacts(M, C, O, B, pair, (first, n), time, found)
     restore_pose(M, B, 0, a)
     restore_pose(M, B, 1, b)
@@ -420,9 +374,9 @@ def generic_contacts(G, M, C, O, B, pair, first, n):
 @formula
 def contacts_of_pairs(G, M, C, O, B):
     """Find all contacts; returns their number, even if the table is too small for them."""
-    n, half = 0, B.count[CURRENT_HALF]
-    for k in range(B.count[PAIRS_IN_LIST]):
-        s, t, way = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.pair[k, 2]  # + 0: all integers of one type
+    n, half = 0, B.count.current_half
+    for k in range(B.count.pairs):
+        s, t, way = B.pair.first[k] + 0, B.pair.second[k] + 0, B.pair.kind[k]  # + 0: all integers of one type
         first = B.seen[half, k] + 0
         if way == GENERIC_PAIR:
             found = generic_contacts(G, M, C, O, B, (s, t), first, n)
@@ -434,7 +388,7 @@ def contacts_of_pairs(G, M, C, O, B):
             else:
                 found = plane_sphere_contact(C, B, s, t, 1.0, n)
             if found != 0:
-                write_contact_identity(C, n, B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE], 0, first)
+                write_contact_identity(C, n, B.slot.shape_index[s], B.slot.shape_index[t], 0, first)
         B.seen[1 - half, k] = n if found > 0 else -1
         n += found
     return n
@@ -450,36 +404,36 @@ REBUILD_FRACTION = 0.3  # fraction of shapes outside their envelopes above which
 @formula
 def rebuild_list(G, M, O, B):
     """List all pairs; returns whether the table was large enough."""
-    B.count[LIST_VALID] = 0
+    B.count.list_valid = 0
     clear_table(B)
     store_all_pairs(O, B)
     sort_shapes(G, M, B)
-    for w in range(B.count[WIDE]):
-        s = B.count[BOUNDED] + w
-        update_plane(G, M, B, w, B.slot[s, SLOT_SHAPE], B.slot[s, SLOT_MOVER])
+    for w in range(B.count.wide):
+        s = B.count.bounded + w
+        update_plane(G, M, B, w, B.slot.shape_index[s], B.slot.mover[s])
         B.mark[s] = 0
     room = list_all(G, B)
     clear_table(B)
-    B.count[REBUILDS] += 1
-    B.count[PAIRS_AT_REBUILD] = B.count[PAIRS_IN_LIST]
-    B.count[LIST_VALID] = 1 if room else 0
+    B.count.rebuilds += 1
+    B.count.pairs_at_rebuild = B.count.pairs
+    B.count.list_valid = 1 if room else 0
     return room
 
 
 @formula
 def repair_list(G, B):
     """List pairs of shapes outside their envelopes again: 1 on success, 0 if the table is full, -1 to rebuild all."""
-    if B.count[MOVED_SLOTS] > REBUILD_FRACTION * B.count[BOUNDED] + 8.0:
+    if B.count.moved_slots > REBUILD_FRACTION * B.count.bounded + 8.0:
         return -1
-    B.count[LIST_VALID] = 0
-    for k in range(B.count[MOVED_SLOTS]):
+    B.count.list_valid = 0
+    for k in range(B.count.moved_slots):
         s = B.moved[k]
-        if s < B.count[BOUNDED] and not renew_envelope(B, s):
+        if s < B.count.bounded and not renew_envelope(B, s):
             return -1
     drop_moved(B)
     room = list_moved(G, B)
     clear_table(B)
-    B.count[LIST_VALID] = 1 if room else 0
+    B.count.list_valid = 1 if room else 0
     return 1 if room else 0
 
 
@@ -487,46 +441,42 @@ def repair_list(G, B):
 def add_displacement(B, displacement):
     """Add to the displacements since the frame last advanced."""
     for c in range(3):
-        B.real[DISPLACEMENT + c] += displacement[c]
+        B.frame.displacement[c] += displacement[c]
 
 
 @formula
 def update_list(G, M, O, B, task):
     """Update the list of pairs; returns whether the table was large enough."""
     for c in range(3 if task != NEW_VELOCITIES else 0):
-        B.real[FRAME_ORIGIN + c] += B.real[FRAME_STEP + c]
-    if B.count[LIST_VALID] == 0:
+        B.frame.origin[c] += B.frame.step[c]
+    if B.count.list_valid == 0:
         return rebuild_list(G, M, O, B)
     n, way = update_slots(G, M, B)
     add_displacement(B, way)
     mended = 1
-    if (
-        task == REBUILD
-        or O.count[NUMBER] != B.count[SEARCHES]
-        or B.count[PAIRS_IN_LIST] > 2 * B.count[PAIRS_AT_REBUILD] + 64
-    ):
+    if task == REBUILD or O.count.number != B.count.searches or B.count.pairs > 2 * B.count.pairs_at_rebuild + 64:
         mended = -1
-    elif B.count[MOVED_SLOTS] > 0:
+    elif B.count.moved_slots > 0:
         mended = repair_list(G, B)
     if mended < 0:
         return rebuild_list(G, M, O, B)
     if task != NEW_VELOCITIES:
-        advance_frame(B, n, (B.real[DISPLACEMENT], B.real[DISPLACEMENT + 1], B.real[DISPLACEMENT + 2]))
+        advance_frame(B, n, (B.frame.displacement[0], B.frame.displacement[1], B.frame.displacement[2]))
         for c in range(3):
-            B.real[DISPLACEMENT + c] = 0.0
+            B.frame.displacement[c] = 0.0
     return mended == 1
 
 
 @formula
 def midway_contacts(G, M, C, O, B):
     """Find contacts of the listed pairs at these poses; the data of the last search are unchanged."""
-    ahead = B.real[AHEAD]
-    B.real[AHEAD] = 0.0
+    ahead = B.real.ahead
+    B.real.ahead = 0.0
     _, way = update_slots(G, M, B)
     add_displacement(B, way)
     n = contacts_of_pairs(G, M, C, O, B)
-    B.real[AHEAD] = ahead
-    C.count[FOUND] = n
+    B.real.ahead = ahead
+    C.count.found = n
     return DONE if n <= C.x.shape[0] else FULL_CONTACTS
 
 
@@ -537,26 +487,26 @@ def find_contacts(G, M, C, O, B, task):
         return midway_contacts(G, M, C, O, B)
     bad = set_frame(M, B)
     if bad >= 0:
-        C.count[FOUND] = bad
+        C.count.found = bad
         return NOT_FINITE
     if not update_list(G, M, O, B, task):
-        C.count[FOUND] = 0
+        C.count.found = 0
         return FULL_PAIRS
     n = contacts_of_pairs(G, M, C, O, B)
-    B.count[PAIRS_EXAMINED] += B.count[PAIRS_IN_LIST]
-    C.count[FOUND] = n
+    B.count.pairs_examined += B.count.pairs
+    C.count.found = n
     if n > C.x.shape[0]:
         return FULL_CONTACTS
-    B.count[CURRENT_HALF] = 1 - B.count[CURRENT_HALF]
-    B.count[SEARCHES] += 1
-    C.count[NUMBER] = B.count[SEARCHES]
+    B.count.current_half = 1 - B.count.current_half
+    B.count.searches += 1
+    C.count.number = B.count.searches
     return DONE
 
 
 @kernel
 def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
-    """Find contacts at the movers' poses. Returns a status (DONE, FULL_*, NOT_FINITE), also in ``C.count[STATUS]``."""
-    C.count[STATUS] = find_contacts(G, M, C, O, B, task)
-    C.count[REBUILT] = B.count[REBUILDS]
-    C.count[PAIRS] = B.count[PAIRS_IN_LIST]
-    return C.count[STATUS]
+    """Find contacts at the movers' poses. Returns a status (DONE, FULL_*, NOT_FINITE), also in ``C.count.status``."""
+    C.count.status = find_contacts(G, M, C, O, B, task)
+    C.count.rebuilt = B.count.rebuilds
+    C.count.pairs = B.count.pairs
+    return C.count.status

@@ -2,8 +2,6 @@
 
 A *mover* is a body that carries shapes: a pose and a velocity. Fixed shapes have mover -1. Planar mechanisms
 stay at z = 0; their shapes have kinds of their own, whose normals lie in the plane.
-
-Constants name the columns of each array.
 """
 
 from __future__ import annotations
@@ -12,32 +10,40 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.struct_layout import CodeTables1, Float2, Int1, Int2
+from ..compiler.struct_layout import CodeTables1, Column, Float2, Int1, Int2, Record, Vector3, Vector8, Vector9
 
-# columns of Geometry.shape_i
-KIND, MOVER, FIRST, COUNT, FACE_FIRST, FACE_COUNT, MEMBER, MASK, MATERIAL = range(9)
-# columns of Geometry.shape_x
-PLACE, AXES, PAR, RADIUS = 0, 3, 12, 20
-# columns of Contacts.at
-SHAPE_1, SHAPE_2, FEATURE, BEFORE = range(4)
-# columns of Contacts.x
-POINT, NORMAL, GAP, APART = 0, 3, 6, 7
-# entries of Contacts.count
-FOUND, STATUS, REBUILT, PAIRS, NUMBER = range(5)
 # status of a search; FULL_*: enlarge that table and call again with the same state
 DONE, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE = range(4)
-# entries of Search.real: largest gap of a contact; displacement, relative to the radius, after which the pairs of a
-# shape are listed again; time until the next search (shapes that may touch within it have a contact)
-MARGIN, SKIN, AHEAD = range(3)
+
+
+class Shapes(Record, kind="Int", rows=True):
+    """Structure of each shape."""
+
+    kind: Column
+    mover: Column  # or -1
+    first: Column  # vertex
+    count: Column  # of vertices
+    face_first: Column
+    face_count: Column
+    member: Column  # groups to which it belongs (bits)
+    mask: Column  # groups with which it collides; both shapes must select a group of the other
+    material: Column
+
+
+class Dimensions(Record, kind="Float", rows=True):
+    """Numbers of each shape."""
+
+    place: Vector3  # of its origin relative to its mover's, in the mover's axes
+    axes: Vector9  # in the mover's axes
+    par: Vector8  # parameters of its kind
+    radius: Column  # of a bounding sphere about its origin (inf for unbounded shapes)
 
 
 class Geometry(NamedTuple):
     """The shapes; constant during a run."""
 
-    shape_i: Int2  # (ns, 9): kind, mover or -1, first vertex and count, first face and count, groups to which
-    # it belongs and groups with which it collides (bits; both shapes must select a group of the other), material
-    shape_x: Float2  # (ns, 24): its origin relative to its mover's and its axes, in the mover's axes; parameters of
-    # its kind (at 12); radius of a bounding sphere about its origin (inf for unbounded shapes)
+    shape: Shapes
+    dimensions: Dimensions
     vertex: Float2  # (nv, 3): of hulls, polygons and height fields, in the shape's axes
     face: Int1  # (nf,): faces of hulls: number of corners, then corners counter-clockwise seen from outside, ...
     apart: Int2  # (nx, 2): pairs of movers (smaller first; -1: fixed) that never touch, sorted
@@ -51,12 +57,44 @@ class Movers(NamedTuple):
     twist: Float2  # (n, 6): velocity [m/s] of its origin, angular velocity [rad/s]
 
 
+class ContactCounts(Record, kind="Int"):
+    """Counts of a search."""
+
+    found: int  # contacts (of a full table: the required number; NOT_FINITE: the mover)
+    status: int
+    rebuilt: int  # number of rebuilds of the pair list
+    pairs: int
+    number: int  # of the search
+
+
+class ContactShapes(Record, kind="Int", rows=True):
+    """Identity of each contact."""
+
+    shape_1: Column
+    shape_2: Column
+    feature: Column  # identifies the contacts of a pair, constant from step to step
+    before: Column  # index of the same contact in the last search, or -1
+
+
+class ContactPoints(Record, kind="Float", rows=True):
+    """Place of each contact, in world axes."""
+
+    point: Vector3  # midway between the surfaces [m]
+    normal: Vector3  # unit normal from 1 to 2
+    gap: Column  # [m] (< 0: overlap)
+    apart: Vector3  # half the distance of that point on the two shapes until they touch (subtracted on 1)
+
+
 class Contacts(NamedTuple):
     """Contacts at one time. Two of these are used alternately, to match contacts with those of the last search."""
 
-    count: Int1  # type: ignore[assignment]  # (8,): number of contacts, status, number of rebuilds of the pair list,
-    # number of pairs, number of the search
-    at: Int2  # (capacity, 4): shape 1, shape 2, feature (identifies the contacts of a pair, constant from step
-    # to step), index of the same contact in the last search or -1. Contacts of a pair are consecutive.
-    x: Float2  # (capacity, 10): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
-    # overlap), half the distance of that point on the two shapes until they touch (subtracted on 1), all in world axes
+    count: ContactCounts  # type: ignore[assignment]
+    at: ContactShapes  # contacts of a pair are consecutive
+    x: ContactPoints
+
+
+def no_contacts(capacity: int) -> Contacts:
+    """Create an empty table of contacts."""
+    C = Contacts(ContactCounts.blank(), ContactShapes.blank(capacity), ContactPoints.blank(capacity))
+    C.at[:] = -1
+    return C

@@ -382,7 +382,10 @@ def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tup
     TypeError
         If it is not of that type.
     """
-    of = of.array if isinstance(of, RecordLayout) else of
+    if isinstance(of, RecordLayout):
+        if x.shape[0] < of.of.layout.width if of.of.layout.vectors else x.shape[-1] != of.of.layout.width:
+            raise TypeError(f"{name}: {of.of.layout.width} numbers are needed for {of}, got {x.shape}")
+        of = of.array
     if x.ndim != of.ndim or x.dtype != of.dtype or x.flags.num & _ORDER != _ORDER:
         raise TypeError(
             f"{name}: an array of {np.dtype(of.dtype)} with {of.ndim} dimensions and without gaps is needed, got "

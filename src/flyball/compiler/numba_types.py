@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -52,10 +52,11 @@ def load_members(builder: Any, address: Any, skipped: int = 0) -> Any:
 
 
 class _ArrayReader:
-    """Generator of code that reads an array's description."""
+    """Generator of code that reads an array's description; of entries of a record, that of the record."""
 
     def __init__(self, context: Any, builder: Any, typ: Any, value: Any) -> None:
         self.context, self.builder, self.array, self.address = context, builder, typ.array, value
+        self.part = typ.part
 
     def word(self, k: int, of: Any = None) -> Any:
         """Word k of the description: see `layout`."""
@@ -64,6 +65,8 @@ class _ArrayReader:
 
     def shape(self, k: int) -> Any:
         """Length of dimension k."""
+        if self.part is not None and k == self.array.ndim - 1 and self.part.count > 1:
+            return INTEGER(self.part.count)
         return self.word(HEAD // 8 + k)
 
     def data(self) -> Any:
@@ -94,6 +97,8 @@ class _ArrayReader:
 
     def element(self, indices: list[Any]) -> Any:
         """Address of an element; of the first of a row if the last index is left out."""
+        if self.part is not None:
+            return self.builder.gep(self.data(), [self.part.place(self.builder, indices)], inbounds=True)
         flat = indices[0]
         for k in range(1, self.array.ndim):
             flat = self.builder.mul(flat, self.shape(k))
@@ -115,6 +120,23 @@ class _ArrayReader:
         for name, value, k in filled:
             made = self.builder.insert_value(made, value, [model.get_field_position(name), *k])
         return made
+
+
+class _Part(NamedTuple):
+    """Entries of a record: first number, count, length of a row (0: the record is one row)."""
+
+    first: int
+    count: int
+    width: int
+
+    def place(self, builder: Any, indices: list[Any]) -> Any:
+        """Place of a number in the record's array; without a last index, of the first of its row."""
+        first, *more = indices
+        flat = first
+        if self.width:
+            flat = builder.mul(first, first.type(self.width))
+            flat = builder.add(flat, more[0]) if more else flat
+        return builder.add(flat, flat.type(self.first))
 
 
 class Structure(types.Type):
@@ -172,22 +194,35 @@ class Reference(types.Type):
 
     def __init__(self, named: Array | RecordLayout) -> None:
         layout = named.array if isinstance(named, RecordLayout) else named
-        self.names = named.of.names if isinstance(named, RecordLayout) else ()
-        self.layout = named
+        self.entries = named.of.layout.entries if isinstance(named, RecordLayout) else {}
+        self.layout, self.part = named, None
         self.array = types.Array(from_dtype(np.dtype(layout.dtype)), layout.ndim, "C")
         self.dtype, self.ndim = self.array.dtype, layout.ndim
         super().__init__(name=f"Array_{named}")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
         """Numba converts it to an array of its own."""
-        return Conversion.safe if other == self.array else None
+        return Conversion.safe if other == self.array and self.part is None else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:
         """Numba's array, where either may occur."""
-        return self.array if other == self.array else None
+        return self.array if other == self.array and self.part is None else None
+
+
+class PartReference(Reference):
+    """Type of some entries of a record, passed by the address of the record's description."""
+
+    def __init__(self, record: Any, name: str) -> None:
+        (first, count), ndim = record.entries[name], record.ndim
+        self.layout, self.entries = (record.layout, name), {}
+        self.part = _Part(first, count, record.layout.of.layout.width if ndim == 2 else 0)
+        self.array = types.Array(record.dtype, ndim if count > 1 else 1, "C")
+        self.dtype, self.ndim = record.dtype, self.array.ndim
+        types.Type.__init__(self, name=f"{record.name}.{name}")
 
 
 @register_model(Reference)
+@register_model(PartReference)
 class ReferenceModel(models.OpaqueModel):
     """Data model: an address."""
 
@@ -212,10 +247,16 @@ class _ArrayAttributes(AttributeTemplate):  # type: ignore[misc]
         return types.UniTuple(types.intp, typ.array.ndim)
 
     def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
-        return typ.dtype if attr in typ.names else None
+        if attr not in typ.entries:
+            return None
+        if typ.layout.of.layout.vectors:
+            return types.Array(typ.dtype, 1, "C")
+        return typ.dtype if typ.ndim == 1 and typ.entries[attr][1] == 1 else PartReference(typ, attr)
 
 
 def _by_numba(context: Any, builder: Any, sig: Any, place: _ArrayReader, args: Any, what: Any) -> Any:
+    if place.part is not None:
+        raise TypingError(f"{sig.args[0]}: entries of a record are read by integers")
     own = signature(sig.return_type, place.array, *sig.args[1:])
     return context.get_function(what, own)(builder, (place.whole(), *args[1:]))
 
@@ -253,16 +294,18 @@ def _shape(context: Any, builder: Any, typ: Any, value: Any) -> Any:
 
 @lower_getattr_generic(Reference)
 def _get_entry(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
-    place = _ArrayReader(context, builder, typ, value)
-    at = place.element([context.get_constant(types.intp, typ.names.index(name))])
-    return load_item(context, builder, typ.array, at)
+    first, count = typ.entries[name]
+    place, index = _ArrayReader(context, builder, typ, value), context.get_constant(types.intp, first)
+    if typ.layout.of.layout.vectors:
+        return place.row(types.Array(typ.dtype, 1, "C"), index)
+    return value if typ.ndim > 1 or count > 1 else load_item(context, builder, typ.array, place.element([index]))
 
 
 @lower_setattr_generic(Reference)
 def _set_entry(context: Any, builder: Any, sig: Any, args: Any, name: str) -> Any:
     typ, of = sig.args
     place = _ArrayReader(context, builder, typ, args[0])
-    at = place.element([context.get_constant(types.intp, typ.names.index(name))])
+    at = place.element([context.get_constant(types.intp, typ.entries[name][0])])
     store_item(context, builder, typ.array, context.cast(builder, args[1], of, typ.dtype), at)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -20,6 +21,14 @@ Short2 = Annotated[np.ndarray, "Short2"]
 Number1 = Annotated[np.ndarray, "Number1"]  # of floats; of complex numbers where a structure is annotated as COMPLEX
 Number2 = Annotated[np.ndarray, "Number2"]
 CodeTables1 = Annotated[np.ndarray, "CodeTables1"]  # addresses of code tables, 0 for none (`by_address`)
+# entries of a `Record`: one value; in records by rows, a column; several values side by side, as components of vectors
+Column = Annotated[np.ndarray, 1]
+Vector2 = Annotated[np.ndarray, 2]
+Vector3 = Annotated[np.ndarray, 3]
+Vector4 = Annotated[np.ndarray, 4]
+Vector6 = Annotated[np.ndarray, 6]
+Vector8 = Annotated[np.ndarray, 8]
+Vector9 = Annotated[np.ndarray, 9]
 COMPLEX = "complex"
 """``ComplexSystem = Annotated[System, COMPLEX]``: the structure whose numbers are complex."""
 
@@ -49,7 +58,7 @@ class CodeTables(Array):
 
 
 class RecordLayout(NamedTuple):
-    """One-dimensional array whose entries have names."""
+    """Array whose entries, or columns, have names."""
 
     array: Array
     of: type[Record]
@@ -60,37 +69,61 @@ class RecordLayout(NamedTuple):
         return self.array.size
 
     def __str__(self) -> str:
-        return f"{self.of.__name__}({','.join(self.of.names)}):{self.array}"
+        names = ",".join(k if n == 1 else f"{k}*{n}" for k, (_, n) in self.of.layout.entries.items())
+        return f"{self.of.__name__}({names}):{self.array}"
+
+
+class RecordForm(NamedTuple):
+    """Entries of a record."""
+
+    entries: dict[str, tuple[int, int]]  # first number and count of numbers by name
+    width: int  # count of all numbers
+    kind: str  # of number
+    rows: bool  # whether there is a row of them for each element
+    vectors: bool  # whether each is a row of the array
 
 
 class Record(np.ndarray):
     """Numbers of one type with names, in one array: ``class Tolerances(Record, kind="Float"): position: float``.
 
-    ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field.
+    ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
+    annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
+    each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``. With ``vectors=True`` each entry is a row
+    of the array, of any length; the array may have further rows. `Annotated[np.ndarray, "mass"]` is another name of
+    ``mass``.
     """
 
-    names: ClassVar[tuple[str, ...]] = ()
-    kind: ClassVar[str]
+    layout: ClassVar[RecordForm]
 
-    def __init_subclass__(cls, kind: str) -> None:
-        cls.names, cls.kind = tuple(cls.__annotations__), kind
-        for k, name in enumerate(cls.names):
-            if hasattr(np.ndarray, name):
+    def __init_subclass__(cls, kind: str, rows: bool = False, vectors: bool = False) -> None:
+        entries, width = dict[str, tuple[int, int]](), 0
+        for name, text in cls.__annotations__.items():
+            if hasattr(Record, name):
                 raise TypeError(f"{cls.__name__}: arrays have an attribute {name!r}; take another name")
-            setattr(cls, name, _entry_property(k))
+            several = re.fullmatch(r"Vector(\d+)", str(text))
+            other = re.fullmatch(r"""Annotated\[np\.ndarray, ["'](\w+)["']\]""", str(text))
+            first, count = entries[name] = entries[other[1]] if other else (width, int(several[1]) if several else 1)
+            width = max(width, first + count)
+            setattr(cls, name, _entry_property(first, count, rows, vectors))
+        cls.layout = RecordForm(entries, width, kind, rows, vectors)
 
     @classmethod
-    def blank(cls, dtype: Any = None) -> Any:
-        """Record of zeros."""
-        return np.zeros(len(cls.names), dtype or {"Int": np.int64}.get(cls.kind, float)).view(cls)
+    def blank(cls, *count: int) -> Any:
+        """Record of zeros; of so many rows, or of vectors of such a length."""
+        dtype: type = {"Int": np.int64, "Short": np.int32}.get(cls.layout.kind, np.float64)
+        shape = (cls.layout.width, *count) if cls.layout.vectors else (*count, cls.layout.width)
+        return np.zeros(shape, dtype).view(cls)
 
 
-def _entry_property(k: int) -> property:
+def _entry_property(first: int, count: int, rows: bool, vectors: bool) -> property:
+    where = first if count == 1 else slice(first, first + count)
+    place = where if vectors else (..., where)
+
     def get(self: Record) -> Any:
-        return self[k]
+        return self.view(np.ndarray)[place] if count > 1 or rows or vectors else self[first]
 
     def put(self: Record, value: Any) -> None:
-        self[k] = value
+        self[place] = value
 
     return property(get, put)
 
@@ -178,7 +211,10 @@ def _declared_layout(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
         return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
     made = scope[text]
     if isinstance(made, type) and issubclass(made, Record):
-        return RecordLayout(_declared_layout(f"{made.kind}1", scope, is_complex), made)
+        return RecordLayout(
+            _declared_layout(f"{made.layout.kind}{1 + (made.layout.rows or made.layout.vectors)}", scope, is_complex),
+            made,
+        )
     if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
         return struct_layout(made.__origin__, COMPLEX in made.__metadata__)
     return struct_layout(made, is_complex)

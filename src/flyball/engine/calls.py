@@ -74,7 +74,7 @@ def set_state(clock, t, y):
     """Store a time and a state in the engine's integrator state."""
     clock.real.t = t
     for i in range(y.shape[0]):
-        clock.y[0, i] = y[i]
+        clock.y.current[i] = y[i]
 
 
 @formula

@@ -23,7 +23,7 @@ from ..laws.bytecode import STACK_RESERVE
 from ..numerics.integrators.butcher_tableaux import Tableau, tableau
 from ..numerics.integrators.explicit_runge_kutta import run_explicit_task
 from ..numerics.integrators.time_loop import (
-    STATE_ROWS,
+    StateVectors,
     StepCounts,
     StepReals,
     StepState,
@@ -37,12 +37,12 @@ from ..tables.law_inputs import force_reading_count
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (
     FLAT,
-    INVERSE_JACOBIAN,
     SCRATCH,
     Counts,
     Modes,
     Options,
     RowScratch,
+    Sensed,
     System,
     VelocityScratch,
     Work,
@@ -162,7 +162,7 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
         z(len(system.column)), z(len(system.column)),
         z(len(structure.terms) if structure.loads or structure.sensed_columns else 0, 6),
         RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
-        z(INVERSE_JACOBIAN + nl, 2 * len(structure.measured) + nl + ne + nc + nw),
+        z(Sensed.layout.width + nl, 2 * len(structure.measured) + nl + ne + nc + nw).view(Sensed),
         Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(structure.depth + 1 + STACK_RESERVE, 3), z(3, ny),
         Options.blank(), Counts.blank(),
@@ -174,7 +174,7 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
 def perform_task(S, W, R, clock, out, task):
     """Run one task; see `run_task`. A formula, so that its callees have one caller and are compiled once."""
     t = clock.real.t
-    y = clock.y[0]
+    y = clock.y.current
     select_generated_code(S, W, task)
     if task == POSITION:
         nq = S.sizes.coordinates
@@ -293,7 +293,7 @@ def idle_clock_pool(ny: int) -> StructPool:
     """Pool of integrator states without integration, for states of length ``ny``."""
     none, one = np.zeros(0, np.int64), np.zeros((1, ny))
     return StructPool(
-        StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((STATE_ROWS, ny)), one, none,
+        StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), StateVectors.blank(ny), one, none,
               np.zeros((INSPECTION_ROWS, 0)))
     )  # fmt: skip
 
@@ -349,7 +349,7 @@ def dependencies_at_states(address, S, W, R, clock, output, states, scale, block
         clock.real.t = states[n, 0]
         for i in range(clock.y.shape[1]):
             if states[n, 1 + i] == states[n, 1 + i]:  # a value that is not given (nan) continues from the state before
-                clock.y[0, i] = states[n, 1 + i]
+                clock.y.current[i] = states[n, 1 + i]
         call(address, S, W, R, clock, output, POSITION)
         unit_rows(S, W, scale)
         if factor_square(S, W) != 0:
@@ -409,7 +409,7 @@ def dependent_rows(
     """
     n, nr = len(states), len(S.rows.law)
     ny = states.shape[1] - 1
-    real, y = StepReals.blank(), np.zeros((1, ny))
+    real, y = StepReals.blank(), StateVectors.blank(ny)
     clock = StepState(real, StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))
     block = np.random.default_rng(0).standard_normal((count + 2, nr))
     kept, out = np.zeros((n, nr, count)), np.zeros((n, 3))

@@ -58,7 +58,7 @@ from ..numerics.complementarity.interior_point import (
 from ..numerics.event_location.guards import GuardState
 from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.time_loop import StepState
-from ..tables.table_definitions import RATE, RETURNED, VALUE, System, Work
+from ..tables.table_definitions import System, Work
 from .calls import SOLVE, OutputBuffer
 from .element_dispatch import effort, force_kind
 from .loads import contact_guard, force_law, force_row, is_sliding, loads_end
@@ -89,12 +89,12 @@ def switch_guard(S, W, t, kind, s, own):
     """Value of a guard of switch s; ``own`` is the address of the guard of a user's kind."""
     if kind == G_SHARED or (W.modes.shared[s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
         return INACTIVE_GUARD
-    way = W.sensed[VALUE, direction_column(S, W, s)]
+    way = W.sensed.value[direction_column(S, W, s)]
     if kind == G_CORNER:
         return way * corner_value(S, W, t, s) if W.modes.mode[s] == OFF else 1.0 - magnitude(way)
     m, k = S.switches.measured[s], S.switches.row[s]
     if kind == G_TURNS and S.switches.partner[s] < 0 and is_sliding(S, W, s):
-        return way * significant_rate(W.sensed[RATE, m], characteristic_rate(S, W, m))
+        return way * significant_rate(W.sensed.rate[m], characteristic_rate(S, W, m))
     if kind >= G_CONE:
         return contact_guard(S, W, W.sensed, W.rows.multiplier, kind, s)
     force = W.rows.multiplier[k] if k >= 0 else 0.0
@@ -102,7 +102,7 @@ def switch_guard(S, W, t, kind, s, own):
     largest = friction_limit(S, W, t, s) if limited else 0.0
     numbers = (W.modes.lower[s], W.modes.upper[s], S.switch_numbers.stiffness[s], S.switch_numbers.damping[s], largest)
     units = S.units[m], characteristic_rate(S, W, m)
-    mode, x, rate = W.modes.mode[s], W.sensed[VALUE, m], W.sensed[RATE, m]
+    mode, x, rate = W.modes.mode[s], W.sensed.value[m], W.sensed.rate[m]
     return guard(own if kind == G_OWN else kind, mode, way, x, rate, force, numbers, units)
 
 
@@ -121,7 +121,7 @@ def guard_rounding(S, W, t, trial, so_far, out):
         out[g] = 0.0
         if kind == G_LOWER or kind == G_UPPER:
             m = S.switches.measured[of]
-            out[g] = POSITION_ROUNDING * max(S.units[m], magnitude(W.sensed[VALUE, m]))
+            out[g] = POSITION_ROUNDING * max(S.units[m], magnitude(W.sensed.value[m]))
         elif (
             kind == G_SLIDES or kind == G_REVERSES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0)
         ):
@@ -147,25 +147,25 @@ def law_rounding(S, W, t, at, trial, most_of):
     nm, first, last = count_measured(S), loads_end(S, W), controller_column(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
     for m in range(trial.shape[1]):
-        trial[VALUE, m] = W.sensed[VALUE, m]
+        trial.value[m] = W.sensed.value[m]
     total = POSITION_ROUNDING * magnitude(f)
     for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
         m = S.code[i + 1]
         if S.code[i] != SENSOR or sensor_repeated(S, at, i):
             continue
-        x, dx = W.sensed[VALUE, m], 0.0
+        x, dx = W.sensed.value[m], 0.0
         if m < 2 * nm:
             least = S.units[m] if m < nm else S.units[m - nm] * max(most_of[0], most_of[1] * W.options.rate)
             dx = POSITION_ROUNDING * max(magnitude(x), least)
         elif m >= first and m < last:
             dx = RELATIVE_ROUNDING * most_of[2]
-        trial[VALUE, m] = x + dx
+        trial.value[m] = x + dx
         g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
         if not g - g == 0.0:
-            trial[VALUE, m] = x - dx
+            trial.value[m] = x - dx
             g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
         total += magnitude(g - f) if g - g == 0.0 else 0.0
-        trial[VALUE, m] = x
+        trial.value[m] = x
     return total
 
 
@@ -202,7 +202,7 @@ def corner_terms(S, W, t, s, fastest):
     for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
         if S.code[i] == SENSOR:
             m = S.code[i + 1]
-            x = magnitude(W.sensed[VALUE, m])
+            x = magnitude(W.sensed.value[m])
             if m < nm:
                 x = max(x, S.units[m])
             elif m < 2 * nm:
@@ -217,8 +217,8 @@ def friction_limit(S, W, t, s):
     k = S.switches.force[s]
     if k < 0:
         return S.switch_numbers.strength[s]
-    x = W.sensed[VALUE, S.forces.F[k]]
-    load = W.sensed[RETURNED, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
+    x = W.sensed.value[S.forces.F[k]]
+    load = W.sensed.returned[S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     laws = (force_law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
     return magnitude(effort(force_kind(S, k), force_row(S.force_parameters, k), x, 0.0, laws, load))
 
@@ -283,7 +283,7 @@ def fill_cell(S, W, t, G, s, c):
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = G.bend[j, s], G.null[j, row]
     else:
-        way = W.sensed[VALUE, direction_column(S, W, s)]
+        way = W.sensed.value[direction_column(S, W, s)]
         if way == 0.0:  # holds in both directions
             return False
         D[c, 0, 0] = way * W.rows.multiplier[row]

@@ -20,8 +20,8 @@ from ..numerics.integrators.implicit_workspace import STEP_START, RadauStepWorks
 from ..numerics.integrators.radau import accept_radau_step as enter_radau
 from ..numerics.integrators.radau import attempt_radau_step, reject_radau_step
 from ..numerics.integrators.radau_stages import interpolate_radau as between_radau
-from ..numerics.integrators.time_loop import BEGIN_SEGMENT, CURRENT, SAVED
-from ..tables.table_definitions import VALUE, ComplexSystem, ComplexWork, System, Work
+from ..numerics.integrators.time_loop import BEGIN_SEGMENT
+from ..tables.table_definitions import ComplexSystem, ComplexWork, System, Work
 from .calls import (
     GUARD_VALUES,
     INERTIAL_TERMS,
@@ -122,7 +122,7 @@ def stabilised_residual(t, k, A, K, c):
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[OUTPUT].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
     own.real.t = t
-    compose_state(c.y[CURRENT], K.d[k], K.v[k], K.z[k], own.y[0], A)
+    compose_state(c.y.current, K.d[k], K.v[k], K.z[k], own.y[0], A)
     for i in range(nv):
         rows[1, i] = K.a[k, i]
     for i in range(nr):
@@ -194,7 +194,7 @@ def stage_jacobian(t, k, A, K, c):
     """Entries of the Jacobian at stage k, or at the state at which the step begins. Returns a status."""
     S, W, P, own = A[S_], A[W_], A[PLAN], A[OWN]
     own.real.t = t
-    compose_state(c.y[CURRENT], K.d[k], K.v[k], K.z[k], own.y[0], A)
+    compose_state(c.y.current, K.d[k], K.v[k], K.z[k], own.y[0], A)
     set_batch_state(own.y[0], k, A, A[STATE_BATCH], K)
     call_engine(A, POSITION)
     store_row_entries(S, W, K, P, k)
@@ -306,9 +306,9 @@ def project_step_end(t, y, dy, A, K):
     restore_start_rates(K, c)
     for j in range(watch.compared_stages.shape[0] if watch.way.shape[0] > 0 and c.count.started == 1 else 0):
         x = watch.compared_places[j]
-        z = c.y[SAVED, : K.z.shape[1]]
+        z = c.y.saved[: K.z.shape[1]]
         A[BETWEEN](K, x, h, K.d[STEP_START], K.a[STEP_START], z)
-        compose_state(c.y[CURRENT], K.d[STEP_START], K.a[STEP_START], z, own.y[0], A)
+        compose_state(c.y.current, K.d[STEP_START], K.a[STEP_START], z, own.y[0], A)
         own.real.t = begin + x * h
         if call_engine(A, GUARD_VALUES) != 0:
             return 1, 0.0
@@ -326,7 +326,7 @@ def copy_modes(A):
     for s in range(S.switches.row.shape[0]):
         WC.modes.mode[s], WC.modes.hold[s] = complex(W.modes.mode[s], 0.0), complex(W.modes.hold[s], 0.0)
         m = direction_column(S, W, s)
-        WC.sensed[VALUE, m] = complex(W.sensed[VALUE, m], 0.0)
+        WC.sensed.value[m] = complex(W.sensed.value[m], 0.0)
         r = S.switches.row[s]
         if r >= 0:
             P.valued[r] = 0 if W.modes.mode[s] == STEADY else P.holonomic[r]

@@ -35,6 +35,7 @@ from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.explicit_runge_kutta import run_explicit_task
 from ..numerics.integrators.time_loop import (
     TRY_STEP,
+    StateVectors,
     StepCounts,
     StepReals,
     StepState,
@@ -43,7 +44,7 @@ from ..numerics.integrators.time_loop import (
     no_segment_start,
 )
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import BIAS, RATE, RETURNED, VALUE, System, Work
+from ..tables.table_definitions import Sensed, System, Work
 from .calls import (
     ENGINE,
     GROUP,
@@ -222,8 +223,8 @@ def remove_rate_residue(S, W, K):
         if K.still[m] > 0.0:
             fastest = largest_measured_rate(S, W) if fastest < 0.0 else fastest
             least = HELD_RESIDUE * max(fastest * S.units[m], K.still[m])
-            x = W.sensed[VALUE, nm + m]
-            W.sensed[VALUE, nm + m] -= min(max(x, -least), least)
+            x = W.sensed.value[nm + m]
+            W.sensed.value[nm + m] -= min(max(x, -least), least)
 
 
 @formula
@@ -251,10 +252,10 @@ def store_guard_inputs(A, K, row):
     nr = S.rows.law.shape[0]
     end = 0 if row == START_VALUES else 1
     for m in range(count_measured(S)):
-        a = W.sensed[BIAS, m]
+        a = W.sensed.bias[m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
             a += W.G[e] * W.velocities.solved[S.column[e]]
-        K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
+        K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed.value[m], W.sensed.rate[m], a
     store_levels(A, K, 0 if row == START_VALUES else K.levels.shape[0] - 1)
     renew_group(A)
     evaluate_all_guards(A, W, A[OWN].real.t, K, row)
@@ -382,7 +383,8 @@ def _event_workspace(S: System, expected: Work, c: np.ndarray, stages: int) -> G
     rows = np.unique(S.switches.row[S.switches.row >= 0])
     columns = np.arange(2 * nm, expected.sensed.shape[1])
     loads = columns[: len(columns) - len(S.switches.row)]
-    spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
+    entries = Sensed.layout.entries
+    spots = [(entries["value"][0], m) for m in columns] + [(entries["returned"][0], m) for m in loads]
     there = expected.sensed, expected.rows.multiplier
     guarded = S.guards.direction, guard_classes(S)
     return allocate_guard_state(*guarded, c, stages, nm, rows, np.array(spots, int), there, 3 * len(S.switches.row))
@@ -391,7 +393,7 @@ def _event_workspace(S: System, expected: Work, c: np.ndarray, stages: int) -> G
 @lru_cache(maxsize=16)
 def idle_event_workspace(c: bytes, stages: int) -> StructBuffer:
     """Empty guard workspace, shared by all loops without guards."""
-    none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
+    none, empty = np.zeros(0, np.int64), (Sensed.blank(0), np.zeros(0))
     return StructBuffer(allocate_guard_state(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
 
 
@@ -438,8 +440,8 @@ class GuardedLoop:
             self._known.append(idle)
         ny = clock.y.shape[1]
         own = StepState(
-            clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.integrals,
-            clock.seen,
+            clock.real.copy(), clock.count.copy(), clock.times, StateVectors.blank(ny), np.zeros((1, ny)),
+            clock.integrals, clock.seen,
         )  # fmt: skip
         self.group, nv = group, W.velocities.solved.shape[0]
         sheet = OutputBuffer(np.zeros((4, max(width, len(S.guards.kind), nv, len(S.rows.law), 1))))
@@ -515,7 +517,7 @@ def _engine_arguments(ny: int, width: int, inspected: np.ndarray) -> EngineArgum
     """
     none = np.zeros(0, np.int64)
     clock = StepState(
-        StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((3, ny)), np.zeros((1, ny)), none, inspected
+        StepReals.blank(), StepCounts.blank(), np.zeros(0), StateVectors.blank(ny), np.zeros((1, ny)), none, inspected
     )
     return EngineArguments(clock, OutputBuffer(np.zeros((4, width))), idle_tableau().fields, np.zeros(2, np.int64))
 

@@ -26,16 +26,8 @@ from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, scale, store
 from ..tables.table_definitions import (
     ALONG,
     BETWEEN,
-    BROYDEN_PRODUCT,
-    BROYDEN_ROW,
-    GAP_BEFORE,
-    INVERSE_JACOBIAN,
-    LOAD,
-    LOAD_BEFORE,
-    RATE,
-    RETURNED,
     SLIDING,
-    VALUE,
+    Sensed,
 )
 from .element_dispatch import effort, force_kind, inputs, wrench
 from .kinematics import load_record, project_wrench
@@ -48,6 +40,7 @@ from .rows import (
     wrench_on_second,
 )
 
+INVERSE_JACOBIAN = Sensed.layout.width  # first row of the inverse Jacobian of the loads' gaps in `Work.sensed`
 SLOW_SLIDING = 1e-10  # relative to the characteristic speed: slower sliding in space takes the direction of its switch
 ONSET_LENGTH = 2.0  # length of the stored direction at the onset of sliding in space; sliding follows it at first
 # relative to the characteristic speed: at this speed the direction mostly follows the velocity, at ONSET_END
@@ -72,13 +65,13 @@ def sliding_direction(S, W, sensed, s):
 
     In the plane it is the direction of the switch, in space `direction_in_space`.
     """
-    way = sensed[VALUE, direction_column(S, W, s)]
-    u = sensed[RATE, S.switches.measured[s]]
+    way = sensed.value[direction_column(S, W, s)]
+    u = sensed.rate[S.switches.measured[s]]
     other = S.switches.partner[s]
     if other < 0:
         return way, 0.0 * way, u * way
-    side = sensed[VALUE, direction_column(S, W, other)]
-    v = sensed[RATE, S.switches.measured[other]]
+    side = sensed.value[direction_column(S, W, other)]
+    v = sensed.rate[S.switches.measured[other]]
     return direction_in_space(characteristic_speed(S, W), (way, side), (u, v))
 
 
@@ -134,10 +127,10 @@ def contact_friction(S, W, k):
     """-mu N d of a contact point sliding along d, on each tangent, and its power; N is the multiplier of the gap."""
     s = S.forces.switch[k]
     if not is_sliding(S, W, s):
-        o = 0.0 * W.sensed[LOAD, S.forces.load[k]]
+        o = 0.0 * W.sensed.load[S.forces.load[k]]
         return o, o, o
     d, e, speed = sliding_direction(S, W, W.sensed, s)
-    pressed, mu = W.sensed[LOAD, S.forces.load[k]], S.switch_numbers.kinetic_friction[s]
+    pressed, mu = W.sensed.load[S.forces.load[k]], S.switch_numbers.kinetic_friction[s]
     # between opening and the end of the step: limited, so that it does not diverge
     if pressed.real < 0.0 and mu.real > 1.0:
         mu = 1.0 + 0.0 * mu
@@ -150,7 +143,7 @@ def contact_guard(S, W, sensed, lam, kind, s):
     """Guard of a contact point: friction cone of sticking, direction of sliding, or edge of the contact area."""
     if kind == G_EDGE:
         held = W.modes.mode[S.switches.other[s]] != OFF
-        return sensed[VALUE, S.switches.measured[s]] if held else NO_GUARD
+        return sensed.value[S.switches.measured[s]] if held else NO_GUARD
     other = S.switches.partner[s]
     if kind == G_CONE:
         if W.modes.mode[s] == OFF:
@@ -161,9 +154,9 @@ def contact_guard(S, W, sensed, lam, kind, s):
         return S.switch_numbers.static_friction[s] * pressed - sqrt(a * a + b * b)
     if not is_sliding(S, W, s):
         return NO_GUARD
-    u = sensed[RATE, S.switches.measured[s]]
-    v = sensed[RATE, S.switches.measured[other]]
-    way, side = sensed[VALUE, direction_column(S, W, s)], sensed[VALUE, direction_column(S, W, other)]
+    u = sensed.rate[S.switches.measured[s]]
+    v = sensed.rate[S.switches.measured[other]]
+    way, side = sensed.value[direction_column(S, W, s)], sensed.value[direction_column(S, W, other)]
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURN_COSINE * speed
     if size * size > ONSET_LENGTH:
@@ -290,7 +283,7 @@ def sliding_sign(S, W, k, rate):
     s = S.forces.switch[k]
     if s < 0:
         return sign(rate)
-    told = W.sensed[VALUE, direction_column(S, W, s)]
+    told = W.sensed.value[direction_column(S, W, s)]
     if told.real == BY_RATE:
         return sign(rate) if magnitude(rate) > rest_rate(S, W, S.forces.F[k]) else 0.0 * told
     return told
@@ -300,10 +293,10 @@ def sliding_sign(S, W, k, rate):
 def effort_along(S, W, t, k):
     """Effort of force k along its measured quantity, and the rate of that quantity."""
     m = S.forces.F[k]
-    x = W.sensed[VALUE, m]
-    rate = W.sensed[RATE, m]
+    x = W.sensed.value[m]
+    rate = W.sensed.rate[m]
     o = 0.0 * x
-    pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else o
+    pressed = W.sensed.load[S.forces.load[k]] if S.forces.load[k] >= 0 else o
     laws = (force_law(S, W, k, 0, (t + o, x, rate)), o, sliding_sign(S, W, k, rate))
     return effort(force_kind(S, k), force_row(S.force_parameters, k), x, rate, laws, pressed), rate
 
@@ -359,16 +352,16 @@ def loads_end(S, W):
 
 @formula
 def reaction_loads(S, W):
-    """Write the loads that follow from the reactions now in W to row RETURNED."""
+    """Write the loads that follow from the reactions now in W to ``returned``."""
     for k in range(S.forces.F.shape[0]):
         n = S.forces.load[k]
         if n < 0:
             continue
         if S.forces.family[k] == SLIDING:
             s = S.forces.switch[k]
-            W.sensed[RETURNED, n] = W.rows.multiplier[S.switches.row[S.switches.other[s]]]
+            W.sensed.returned[n] = W.rows.multiplier[S.switches.row[S.switches.other[s]]]
             if not is_sliding(S, W, s):  # no friction, so no load is needed
-                W.sensed[LOAD, n] = W.sensed[RETURNED, n]
+                W.sensed.load[n] = W.sensed.returned[n]
             continue
         o = 0.0 * W.rows.multiplier[0]
         force = (o, o, o)
@@ -377,7 +370,7 @@ def reaction_loads(S, W):
             if S.load_terms.load[x] == n:
                 f, m = wrench_on_second(S, W, S.load_terms.term[x])
                 force, torque = add(force, f), add(torque, m)
-        W.sensed[RETURNED, n] = pressed(
+        W.sensed.returned[n] = pressed(
             force_row(S.force_parameters, k), load_record(W.FK, S.forces.M[k]), force, torque
         )
 
@@ -385,13 +378,13 @@ def reaction_loads(S, W):
 @formula
 def static_friction_limit(S, W, k, t, arm, load):
     """Largest force that friction k can hold along its quantity at rest, with this arm and load."""
-    return load_dependent_friction(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], 0.0), arm, load, STATIC)
+    return load_dependent_friction(S, W, k, (t, W.sensed.value[S.forces.F[k]], 0.0), arm, load, STATIC)
 
 
 @formula
 def dry_friction(S, W, k, t, rate, arm, load):
     """Magnitude of the sliding friction without its viscous part."""
-    return load_dependent_friction(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], rate), arm, load, sign(rate))
+    return load_dependent_friction(S, W, k, (t, W.sensed.value[S.forces.F[k]], rate), arm, load, sign(rate))
 
 
 @formula
@@ -414,7 +407,7 @@ def may_be_negative(S, n):
 
 @formula
 def returned_loads(S, W):
-    """Write the loads that follow from the reactions now in W to row RETURNED; returns the largest relative change."""
+    """Write the loads that follow from the reactions now in W to ``returned``; return the largest relative change."""
     reaction_loads(S, W)
     worst = 0.0
     small = NEGLIGIBLE_LOAD * force_scale(S, W)
@@ -422,8 +415,8 @@ def returned_loads(S, W):
         n = S.forces.load[k]
         if n < 0:
             continue
-        new = W.sensed[RETURNED, n]
-        change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
+        new = W.sensed.returned[n]
+        change = abs(new - W.sensed.load[n]) / (small + abs(new) + abs(W.sensed.load[n]))
         if not change <= worst:
             worst = change
             W.counts.guilty_row = k
@@ -459,7 +452,7 @@ def update_loads(S, W, attempt):
     if attempt == max_load_tries(W):
         W.counts.load_updates = SLOPES_UNKNOWN
         for n in range(first, last):
-            W.sensed[LOAD, n] = 0.0
+            W.sensed.load[n] = 0.0
         return
     if W.counts.load_updates == SLOPES_UNKNOWN or (attempt == 0 and W.counts.load_updates == 0):
         W.counts.load_updates = 0
@@ -469,18 +462,18 @@ def update_loads(S, W, attempt):
     elif attempt > 0:
         update_inverse_jacobian(W, first, last)
     for n in range(first, last):
-        W.sensed[LOAD_BEFORE, n] = W.sensed[LOAD, n]
-        W.sensed[GAP_BEFORE, n] = W.sensed[LOAD, n] - W.sensed[RETURNED, n]
+        W.sensed.load_before[n] = W.sensed.load[n]
+        W.sensed.gap_before[n] = W.sensed.load[n] - W.sensed.returned[n]
     if W.counts.load_updates < last - first:
         n = first + W.counts.load_updates
-        W.sensed[LOAD, n] -= TRIAL_STEP * W.sensed[GAP_BEFORE, n]
+        W.sensed.load[n] -= TRIAL_STEP * W.sensed.gap_before[n]
         W.counts.load_updates += 1
         return
     for n in range(first, last):
-        new = W.sensed[LOAD, n]
+        new = W.sensed.load[n]
         for k in range(first, last):
-            new -= W.sensed[INVERSE_JACOBIAN + n - first, k] * W.sensed[GAP_BEFORE, k]
-        W.sensed[LOAD, n] = new if new > 0.0 or may_be_negative(S, n) else 0.0
+            new -= W.sensed[INVERSE_JACOBIAN + n - first, k] * W.sensed.gap_before[k]
+        W.sensed.load[n] = new if new > 0.0 or may_be_negative(S, n) else 0.0
 
 
 @formula
@@ -495,24 +488,24 @@ def update_inverse_jacobian(W, first, last):
     moved = 0.0
     along = 0.0
     for n in range(first, last):
-        W.sensed[BROYDEN_PRODUCT, n] = 0.0
-        W.sensed[BROYDEN_ROW, n] = 0.0
+        W.sensed.broyden_product[n] = 0.0
+        W.sensed.broyden_row[n] = 0.0
     for n in range(first, last):
-        dx = W.sensed[LOAD, n] - W.sensed[LOAD_BEFORE, n]
+        dx = W.sensed.load[n] - W.sensed.load_before[n]
         for k in range(first, last):
             b = W.sensed[INVERSE_JACOBIAN + n - first, k]
-            gap = W.sensed[LOAD, k] - W.sensed[RETURNED, k]
-            W.sensed[BROYDEN_PRODUCT, n] += b * (gap - W.sensed[GAP_BEFORE, k])
-            W.sensed[BROYDEN_ROW, k] += dx * b
+            gap = W.sensed.load[k] - W.sensed.returned[k]
+            W.sensed.broyden_product[n] += b * (gap - W.sensed.gap_before[k])
+            W.sensed.broyden_row[k] += dx * b
         moved += dx * dx
-        along += dx * W.sensed[BROYDEN_PRODUCT, n]
+        along += dx * W.sensed.broyden_product[n]
     if not abs(along) > FLAT_STEP * moved:
         return
     for n in range(first, last):
-        dx = W.sensed[LOAD, n] - W.sensed[LOAD_BEFORE, n]
+        dx = W.sensed.load[n] - W.sensed.load_before[n]
         for k in range(first, last):
             W.sensed[INVERSE_JACOBIAN + n - first, k] += (
-                (dx - W.sensed[BROYDEN_PRODUCT, n]) * W.sensed[BROYDEN_ROW, k] / along
+                (dx - W.sensed.broyden_product[n]) * W.sensed.broyden_row[k] / along
             )
 
 
@@ -526,15 +519,15 @@ def update_readings(S, W, t):
     if first == controller_column(S, W, 0):
         return
     for m in range(first, controller_column(S, W, 0)):
-        W.sensed[VALUE, m] = 0.0 * t
+        W.sensed.value[m] = 0.0 * t
     for x in range(S.load_terms.load.shape[0]):
         at, what = S.load_terms.load[x], S.load_terms.term[x]
         if at >= first:
             if what >= 0:
                 add_joint_wrench(S, W, at, what)
             else:
-                W.sensed[VALUE, at] += reading_along(S, W, t, -2 - what)
-                W.sensed[VALUE, at + 1] = -W.sensed[VALUE, at]
+                W.sensed.value[at] += reading_along(S, W, t, -2 - what)
+                W.sensed.value[at + 1] = -W.sensed.value[at]
 
 
 @formula
@@ -542,11 +535,11 @@ def add_joint_wrench(S, W, at, what):
     """Add the effect of term ``what`` of a joint's rows to the joint's wrench, on its second body, about M's origin."""
     force, torque = wrench_on_second(S, W, what)
     for i in range(3):
-        W.sensed[VALUE, at + i] += force[i]
-        W.sensed[VALUE, at + 3 + i] += torque[i]
+        W.sensed.value[at + i] += force[i]
+        W.sensed.value[at + 3 + i] += torque[i]
     for i in range(2):
-        a, b, d = W.sensed[VALUE, at + 3 * i], W.sensed[VALUE, at + 3 * i + 1], W.sensed[VALUE, at + 3 * i + 2]
-        W.sensed[VALUE, at + (FORCE_SIZE if i == 0 else TORQUE_SIZE)] = sqrt(a * a + b * b + d * d)
+        a, b, d = W.sensed.value[at + 3 * i], W.sensed.value[at + 3 * i + 1], W.sensed.value[at + 3 * i + 2]
+        W.sensed.value[at + (FORCE_SIZE if i == 0 else TORQUE_SIZE)] = sqrt(a * a + b * b + d * d)
 
 
 @formula

@@ -20,7 +20,7 @@ from ..numerics.complementarity.dense_problem import NO_SOLUTION, OUTCOME, SOLUT
 from ..numerics.complementarity.dense_solver import solve_dense
 from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.time_loop import StepState
-from ..tables.table_definitions import BIAS, RATE, RETURNED, VALUE, System, Work
+from ..tables.table_definitions import System, Work
 from .calls import MOTION, SOLVE, OutputBuffer
 from .element_dispatch import effort, force_kind
 from .loads import force_law, force_row, reaction_loads
@@ -95,8 +95,8 @@ def store_free_motion(address, S, W, R, clock, output, B, P):
         store_row_response(address, S, W, R, clock, output, B, i)
     for i in range(B.which.shape[0]):
         m = S.switches.measured[B.which[i]]
-        size = magnitude(W.sensed[BIAS, m])
-        P.b[i] = B.sign[i] * (W.sensed[BIAS, m] + gradient_times(S, W, m, B.free))
+        size = magnitude(W.sensed.bias[m])
+        P.b[i] = B.sign[i] * (W.sensed.bias[m] + gradient_times(S, W, m, B.free))
         r = S.rows.law.shape[0] + m
         for e in range(S.row_start[r], S.row_start[r + 1]):
             size += magnitude(W.G[e] * B.free[S.column[e]])
@@ -140,7 +140,7 @@ def store_row_response(address, S, W, R, clock, output, B, i):
 def friction_reach(S, W, t, B, i, load):
     """Limit of the friction of row i under a load, or its sliding force; for impulses only the part due to the load."""
     k = S.switches.force[B.which[i]]
-    x = W.sensed[VALUE, S.forces.F[k]]
+    x = W.sensed.value[S.forces.F[k]]
     first = force_law(S, W, k, 0, (t, x, B.rate[i]))
     kind, par = force_kind(S, k), force_row(S.force_parameters, k)
     if B.asks[IMPULSES] == STEP_IMPULSES:
@@ -158,7 +158,7 @@ def friction_load(S, W, i, B):
     """Load of row i's friction from the multipliers in W; 0 if none."""
     k = S.switches.force[B.which[i]]
     n = S.forces.load[k]
-    return W.sensed[RETURNED, n] if n >= 0 else 0.0
+    return W.sensed.returned[n] if n >= 0 else 0.0
 
 
 @formula
@@ -284,7 +284,7 @@ def store_switch_rates(S, W, y, B):
         m = S.switches.measured[B.which[i]]
         B.now[i] = B.rate[i] = B.seen[i] = 0.0
         if m >= 0:
-            B.now[i], B.rate[i] = W.sensed[VALUE, m], W.sensed[RATE, m]
+            B.now[i], B.rate[i] = W.sensed.value[m], W.sensed.rate[m]
             r = S.rows.law.shape[0] + m
             for e in range(S.row_start[r], S.row_start[r + 1]):
                 d = S.column[e]
@@ -305,5 +305,5 @@ def mode_kernel(S: System, W: Work, engine_call: EngineCall, B: ModeProblem, P: 
     if task == FREE_MOTION:
         return store_free_motion(address, S, W, engine_call.R, engine_call.clock, engine_call.output, B, P)
     status = call(address, S, W, engine_call.R, engine_call.clock, engine_call.output, MOTION)
-    store_switch_rates(S, W, engine_call.clock.y[0], B)
+    store_switch_rates(S, W, engine_call.clock.y.current, B)
     return status

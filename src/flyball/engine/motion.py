@@ -22,7 +22,7 @@ from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import STACK_RESERVE, evaluate_jet, is_entire
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..numerics.integrators.time_loop import DONE, RUNNING, STEP_FAILED, TOO_MANY_STEPS
-from ..tables.table_definitions import BIAS, FINISH, LOADS, RATE, REVOLUTE, SCHUR, VALUE
+from ..tables.table_definitions import FINISH, LOADS, REVOLUTE, SCHUR
 from .calls import call_generated
 from .element_dispatch import progress, remember
 from .kinematics import coordinate_rates, retract
@@ -88,16 +88,16 @@ def corner_rates(S, W, t):
     nr = S.rows.law.shape[0]
     nm = count_measured(S)
     for m in range(nm):
-        a = W.sensed[BIAS, m]
+        a = W.sensed.bias[m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
             a += W.G[e] * W.velocities.solved[S.column[e]]
-        W.sensed[RATE, nm + m] = a
-        W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
-        W.sensed[BIAS, m] = a
+        W.sensed.rate[nm + m] = a
+        W.sensed.bias[nm + m] = W.sensed.bias[m]
+        W.sensed.bias[m] = a
     for c in range(S.control_laws.shape[0]):
         law = S.control_laws[c]
         at = controller_column(S, W, c)
-        W.sensed[BIAS, at] = (
+        W.sensed.bias[at] = (
             evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, ALONG_MOTION)[1] if law >= 0 else 0.0
         )
     for s in range(S.switches.row.shape[0]):
@@ -106,9 +106,9 @@ def corner_rates(S, W, t):
             jet = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, ALONG_MOTION)
             W.modes.drift[s] = jet[2] if W.modes.mode[s] == STEADY else jet[1]
     for m in range(nm):
-        W.sensed[BIAS, m] = W.sensed[BIAS, nm + m]
-        W.sensed[BIAS, nm + m] = 0.0 * W.sensed[VALUE, m]
-        W.sensed[RATE, nm + m] = 0.0 * W.sensed[VALUE, m]
+        W.sensed.bias[m] = W.sensed.bias[nm + m]
+        W.sensed.bias[nm + m] = 0.0 * W.sensed.value[m]
+        W.sensed.rate[nm + m] = 0.0 * W.sensed.value[m]
 
 
 @formula
@@ -133,9 +133,9 @@ def corners_settled(S, W, t, n):
     for s in range(ns):
         if held_on_corner(S, W, s):
             at = direction_column(S, W, s)
-            W.modes.previous_side[s] = W.sensed[VALUE, at]
+            W.modes.previous_side[s] = W.sensed.value[at]
             W.modes.previous_drift[s] = W.modes.drift[s]
-            W.sensed[VALUE, at] -= W.modes.moved_side[s]
+            W.sensed.value[at] -= W.modes.moved_side[s]
     return False
 
 
@@ -150,7 +150,7 @@ def update_corner_slopes(S, W):
         W.modes.given_side[s] = 0.0
     for s in range(ns):
         if held_on_corner(S, W, s):
-            dx = W.sensed[VALUE, direction_column(S, W, s)] - W.modes.previous_side[s]
+            dx = W.sensed.value[direction_column(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if held_on_corner(S, W, k):
                     b = W.modes.inverse_slopes[s, k]
@@ -162,7 +162,7 @@ def update_corner_slopes(S, W):
         return
     for s in range(ns):
         if held_on_corner(S, W, s):
-            dx = W.sensed[VALUE, direction_column(S, W, s)] - W.modes.previous_side[s]
+            dx = W.sensed.value[direction_column(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if held_on_corner(S, W, k):
                     W.modes.inverse_slopes[s, k] += (dx - W.modes.moved_side[s]) * W.modes.given_side[k] / share

@@ -24,7 +24,7 @@ from ..numerics.integrators.time_loop import (
     INSPECTED_START,
     INSPECTED_START_RATE,
 )
-from ..tables.table_definitions import ALONG, BETWEEN, LAW_INPUT, LAW_INPUT_RATE, RATE, SAMPLED, SLIDING, VALUE
+from ..tables.table_definitions import ALONG, BETWEEN, LAW_INPUT, LAW_INPUT_RATE, SAMPLED, SLIDING
 from .calls import call_generated
 from .element_dispatch import branch, breaks, force_kind, inputs
 from .kinematics import load_record
@@ -126,15 +126,15 @@ def store_law_inputs(S, W, buffer, row):
     """Store the inputs of laws and their rates at the state in W."""
     nm = count_measured(S)
     for m in range(2 * nm, W.sensed.shape[1]):  # sides of nonsmooth points do not change within a step
-        buffer[INPUTS_WITHIN, m] = W.sensed[VALUE, m]
+        buffer[INPUTS_WITHIN, m] = W.sensed.value[m]
     for m in range(nm):
-        buffer[row, m] = W.sensed[VALUE, m]
-        buffer[row + 1, m] = W.sensed[RATE, m]
+        buffer[row, m] = W.sensed.value[m]
+        buffer[row + 1, m] = W.sensed.rate[m]
     for f in range(S.forces.F.shape[0]):
         if S.forces.family[f] == SLIDING:
             continue
         if S.forces.family[f] == ALONG:
-            a, b = W.sensed[VALUE, S.forces.F[f]], W.sensed[RATE, S.forces.F[f]]
+            a, b = W.sensed.value[S.forces.F[f]], W.sensed.rate[S.forces.F[f]]
         else:
             F = load_record(W.FK, S.forces.F[f])
             M = load_record(W.FK, S.forces.M[f])

@@ -17,7 +17,7 @@ from ..math.scalar import magnitude
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, norm, scale, store3, sub
 from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.time_loop import StepState
-from ..tables.table_definitions import ALONG, BETWEEN, POINT, SCHUR, VALUE, System, Work
+from ..tables.table_definitions import ALONG, BETWEEN, POINT, SCHUR, System, Work
 from .calls import MOTION, POSITION, OutputBuffer, set_state
 from .kinematics import load_record, twist_column
 from .loads import force_row
@@ -71,7 +71,7 @@ def record_energies(S, W, out, n):
             F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
             out.elastic[n, k] = energy_between(kind, par, F, M)
         elif S.forces.family[k] == ALONG:
-            out.elastic[n, k] = energy_along(kind, par, W.sensed[VALUE, S.forces.F[k]])
+            out.elastic[n, k] = energy_along(kind, par, W.sensed.value[S.forces.F[k]])
 
 
 @formula
@@ -178,7 +178,7 @@ def record_motion_kernel(
         set_state(clock, out.states[n, 0], out.states[n, 1 : 1 + ny])
         for s in range(nw if out.modes.shape[0] > 0 else 0):
             W.modes.mode[s], W.modes.hold[s] = out.modes[n, s], out.modes[n, nw + s]
-            W.sensed[VALUE, direction_column(S, W, s)] = out.modes[n, 2 * nw + s]
+            W.sensed.value[direction_column(S, W, s)] = out.modes[n, 2 * nw + s]
         evaluated = stride > 0 and n % stride == 0
         status = call(address, S, W, R, clock, output, MOTION if evaluated else POSITION)
         record_energies(S, W, out, n)

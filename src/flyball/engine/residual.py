@@ -27,14 +27,9 @@ from ..math.vec import add, col, cross, dot, load3, load9, mv, norm, scale, stor
 from ..tables.table_definitions import (
     ALONG,
     BETWEEN,
-    BIAS,
     FREE,
-    LOAD,
     PLANAR,
-    RATE,
-    RETURNED,
     SLIDING,
-    VALUE,
     ComplexSystem,
     ComplexWork,
 )
@@ -153,10 +148,10 @@ def force_slopes(S, W, t, out):
 def effort_slopes(S, W, t, k, out):
     """Stiffness and damping of force k along a measured quantity."""
     m = S.forces.F[k]
-    x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
+    x, rate = W.sensed.value[m], W.sensed.rate[m]
     d = DIFFERENCE_STEP * S.units[m]
     e = d * W.options.rate + DIFFERENCE_STEP * abs(rate)
-    pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
+    pressed = W.sensed.load[S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     for j in range(5):
         dx = d if j == 1 else -d if j == 2 else 0.0
         dr = e if j == 3 else -e if j == 4 else 0.0
@@ -311,9 +306,9 @@ def store_residual(S, W, t, p, lam, out):
         out[nv + 2 * nr + k] = -W.rows.gamma[k]
     nm = count_measured(S)
     for m in range(nm):
-        out[nv + 3 * nr + m] = W.sensed[VALUE, m]
-        out[nv + 3 * nr + nm + m] = W.sensed[RATE, m]
-        out[nv + 3 * nr + 2 * nm + m] = W.sensed[BIAS, m]
+        out[nv + 3 * nr + m] = W.sensed.value[m]
+        out[nv + 3 * nr + nm + m] = W.sensed.rate[m]
+        out[nv + 3 * nr + 2 * nm + m] = W.sensed.bias[m]
     f = W.velocities.applied
     apply_multipliers(S, W, t, p, lam)
     inertial_wrenches(S, W)
@@ -345,7 +340,7 @@ def apply_multipliers(S, W, t, p, lam):
         W.rows.multiplier[k] = lam[k]
     reaction_loads(S, W)
     for n in range(2 * count_measured(S), loads_end(S, W)):
-        W.sensed[LOAD, n] = W.sensed[RETURNED, n]
+        W.sensed.load[n] = W.sensed.returned[n]
     update_controllers(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], W.y[1])
 
 

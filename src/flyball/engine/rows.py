@@ -20,7 +20,6 @@ from ..constraints.switches.guard_kinds import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub
-from ..tables.table_definitions import BIAS, RATE, VALUE
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7
@@ -64,7 +63,7 @@ def begin(S, W):
     for k in range(W.rows.value.shape[0]):
         W.rows.value[k] = 0.0
     for m in range(count_measured(S)):
-        W.sensed[VALUE, m] = 0.0
+        W.sensed.value[m] = 0.0
     for e in range(W.G.shape[0]):
         W.G[e] = 0.0
 
@@ -85,7 +84,7 @@ def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
     if r < nr:
         W.rows.value[r] += c * g
     else:
-        W.sensed[VALUE, r - nr] += c * g
+        W.sensed.value[r - nr] += c * g
     if W.T.shape[0] > 0:
         store3(W.T, k, 0, force)
         store3(W.T, k, 3, torque_M)
@@ -104,7 +103,7 @@ def add_bias(S, W, k, bias):
     if r < nr:
         W.rows.gamma[r] -= S.term_parameters[k, COEFFICIENT] * bias
     else:
-        W.sensed[BIAS, r - nr] += S.term_parameters[k, COEFFICIENT] * bias
+        W.sensed.bias[r - nr] += S.term_parameters[k, COEFFICIENT] * bias
 
 
 @formula
@@ -199,7 +198,7 @@ def begin_rows(S, W):
     for k in range(S.rows.law.shape[0]):
         W.rows.gamma[k] = 0.0
     for m in range(count_measured(S)):
-        W.sensed[BIAS, m] = 0.0
+        W.sensed.bias[m] = 0.0
 
 
 @formula
@@ -283,7 +282,7 @@ def begin_biases(S, W, v):
     """Start of the biases: rates of the measured quantities; gamma of the laws as far as they depend on time."""
     update_measured_rates(S, W, v)
     for m in range(count_measured(S)):
-        W.sensed[BIAS, m] = 0.0
+        W.sensed.bias[m] = 0.0
     for k in range(S.rows.law.shape[0]):
         W.rows.gamma[k] = W.rows.nu_dot[k]
 
@@ -294,11 +293,11 @@ def update_measured_rates(S, W, v):
     nr = S.rows.law.shape[0]
     nm = count_measured(S)
     for m in range(nm):
-        s = 0.0 * W.sensed[VALUE, m]
+        s = 0.0 * W.sensed.value[m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
             s += W.G[e] * v[S.column[e]]
-        W.sensed[RATE, m] = s
-        W.sensed[VALUE, nm + m] = s
+        W.sensed.rate[m] = s
+        W.sensed.value[nm + m] = s
 
 
 @formula
@@ -340,7 +339,7 @@ def largest_measured_rate(S, W):
     """Largest measured rate, relative to the unit of its quantity."""
     fastest = 0.0
     for m in range(count_measured(S)):
-        fastest = max(fastest, magnitude(W.sensed[RATE, m]) / S.units[m])
+        fastest = max(fastest, magnitude(W.sensed.rate[m]) / S.units[m])
     return fastest
 
 
@@ -354,10 +353,10 @@ def controller_column(S, W, c):
 def update_controllers(S, W, t, z, dz):
     """Write the states z where laws read them; their rates go to ``dz`` and to where laws' derivatives read them."""
     for c in range(S.control_laws.shape[0]):
-        W.sensed[VALUE, controller_column(S, W, c)] = z[c]
+        W.sensed.value[controller_column(S, W, c)] = z[c]
     for c in range(S.control_laws.shape[0]):
         law = S.control_laws[c]
         o = 0.0 * t
         rate = evaluate(S.code, S.const, law, W.stack, (t, o, o), W.sensed) if law >= 0 else o
-        W.sensed[RATE, controller_column(S, W, c)] = rate
+        W.sensed.rate[controller_column(S, W, c)] = rate
         dz[c] = rate

@@ -23,7 +23,7 @@ from ..compiler.struct_layout import Float1, Float2, Int1, Int2
 from ..laws.bytecode import evaluate
 from ..numerics.integrators.butcher_tableaux import Tableau
 from ..numerics.integrators.time_loop import DONE, FORCES_JUMPED, RUNNING, STEP_FAILED, StepState
-from ..tables.table_definitions import VALUE, System, Work
+from ..tables.table_definitions import System, Work
 from .calls import INTEGRATE, MOTION, OutputBuffer
 from .entry_point import engine
 from .rows import controller_column
@@ -118,10 +118,10 @@ def sample_controllers(A):
                 at += INSTANT_ROUNDING * abs(at)  # laws that jump at the instant have their later value
                 P.value[u] = evaluate(S.code, S.const, P.row[u, SAMPLE_LAW], W.stack, (at, 0.0, 0.0), W.sensed)
                 if late == 0:
-                    W.sensed[VALUE, controller_column(S, W, P.row[u, SAMPLE_STATE])] = P.value[u]
+                    W.sensed.value[controller_column(S, W, P.row[u, SAMPLE_STATE])] = P.value[u]
     for u in range(P.row.shape[0]):
         if is_due(P, P.row[u, SAMPLE_CLOCK], t):
-            clock.y[0, z + P.row[u, SAMPLE_STATE]] = P.value[u]
+            clock.y.current[z + P.row[u, SAMPLE_STATE]] = P.value[u]
     for k in range(P.next.shape[0]):
         while is_due(P, k, t):
             P.next[k] += 1

@@ -26,7 +26,7 @@ from ..model.expressions import is_number_text
 from ..model.model import Model
 from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import LOAD, NUMBERS, PLANAR, RETURNED, VALUE, System, Work, named_arrays, with_numbers
+from ..tables.table_definitions import NUMBERS, PLANAR, System, Work, named_arrays, with_numbers
 from ..tables.values import values
 from .graph import Graph, Node, Symbol, object_vector
 
@@ -115,7 +115,7 @@ def trace_equations(
     _kinematics(S, W, t, own, v, z)
     nm = count_measured(S)
     for n, load in enumerate(loads):
-        W.sensed[LOAD, 2 * nm + n] = load
+        W.sensed.load[2 * nm + n] = load
     T = np.array([[0.0] * nv] * s.nq, object).reshape(s.nq, nv)
     _rates(S, q, v, T)
     f = W.velocities.applied
@@ -130,8 +130,8 @@ def trace_equations(
     reaction_loads(S, W)
     return TracedEquations(
         graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.rows.value.copy(), W.rows.nu.copy(), G,
-        W.rows.gamma.copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, zdot,
-        W.sensed[RETURNED, 2 * nm : 2 * nm + len(loads)].copy(),
+        W.rows.gamma.copy(), W.sensed[:3, :nm].T.copy(), gradients, zdot,
+        W.sensed.returned[2 * nm : 2 * nm + len(loads)].copy(),
     )  # fmt: skip
 
 

@@ -35,7 +35,6 @@ from ..statics.replacement_joints import (
     support_with_friction,
 )
 from ..statics.stability import RestState
-from ..tables.table_definitions import VALUE
 
 if TYPE_CHECKING:
     from .linearize import OperatingPointOptions
@@ -266,7 +265,7 @@ def frozen_mode_model(
             gone.pop(e.name, None)
             slides.append(e.title)
         elif not off:
-            value = float(c.work.sensed[VALUE, c.structure.switches[k].measured])
+            value = float(c.work.sensed.value[c.structure.switches[k].measured])
             parts.append(holding_constraint(e, x.switch, c.values, value))
     out = model.changed(gone)
     out.add(*parts)

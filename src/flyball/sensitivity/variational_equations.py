@@ -149,7 +149,7 @@ class VariationalIntegration:
         self.motion_width = 1 + len(start.y) + self.nv + self.nr + len(self.prescribed)
         self.width = self.motion_width + self.n * (4 * self.nv + self.nr + self.nz)
         self.own = clock._replace(
-            real=clock.real.copy(), count=clock.count.copy(), y=np.zeros((ex.STATE_ROWS, len(start.y))),
+            real=clock.real.copy(), count=clock.count.copy(), y=ex.StateVectors.blank(len(start.y)),
             K=np.zeros((1, len(start.y))),
         )  # fmt: skip
         self.output = OutputBuffer(np.zeros((4, max(self.motion_width, 1))))
@@ -202,7 +202,7 @@ class VariationalIntegration:
         size = self.sizes[:, None]
         clock = self._clock(np.concatenate([dq, dv], axis=1) * size)
         for k, change in enumerate(dc * size):
-            clock.y[0, self._places(k + 1)[: self.controls]] = change
+            clock.y.current[self._places(k + 1)[: self.controls]] = change
         buffer = np.zeros((max(2, min(len(clock.times), OUTPUT_NUMBERS // self.width + 1)), self.width))
         none = np.zeros((0, self._state_width))
         rows = []
@@ -246,14 +246,14 @@ class VariationalIntegration:
     def _clock(self, changes: np.ndarray) -> ex.StepState:
         """Integrator state of motion and derivatives."""
         own, n = self.clock, self.n
-        Y = np.zeros((ex.STATE_ROWS, self._state_width))
+        Y = ex.StateVectors.blank(self._state_width)
         at, more = self.nq + self.nv, 2 * self.nv * n
         y = self.start.y
         Y[0, :at], Y[0, at : at + more], Y[0, self._places(0)] = y[:at], changes.ravel(), y[at:]
-        unit, v_unit = own.y[ex.UNIT], self.c.values.system.velocity_units
+        unit, v_unit = own.y.unit, self.c.values.system.velocity_units
         rates = np.concatenate([v_unit, unit[self.nq : at]])
-        Y[ex.UNIT] = 1.0
-        Y[ex.UNIT, :at], Y[ex.UNIT, at : at + more] = unit[:at], np.tile(rates, n)
+        Y.unit = 1.0
+        Y.unit[:at], Y.unit[at : at + more] = unit[:at], np.tile(rates, n)
         accounts = [self._places(k)[own.integrals - at] for k in range(n + 1)]
         count = own.count.copy()
         count.controlled = at + more + (n + 1) * self.controls
@@ -281,7 +281,7 @@ class VariationalIntegration:
         real.t = t
         y, at = own.y.copy(), self.nq + self.nv
         places = at + np.arange(self.nz) if motion_only else self._places(0)
-        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, places]
+        y[0, :at], y[0, at:] = clock.y.current[:at], clock.y.current[places]
         stopped = own._replace(real=real, count=clock.count, y=y)
         message, cause = failure_reason(self.start.assembly, self.start.base, stopped, with_result=False)
         error = SimulationError(

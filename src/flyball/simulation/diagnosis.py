@@ -30,7 +30,7 @@ from ..model.expression_parser import tree_text
 from ..model.force import CoordinateForce
 from ..model.messages import abbreviated
 from ..numerics.integrators import time_loop as ex
-from ..tables.table_definitions import LOAD, REVOLUTE
+from ..tables.table_definitions import REVOLUTE
 from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
 from .sampling_instants import sampling_limits_steps
 
@@ -401,7 +401,7 @@ def _end_of_curve(a: Assembly, clock: ex.StepState) -> str:
     s, numbers = a.compiled.structure, a.compiled.values.numbers
     for joint in s.model.joints:
         at = s.state_at.get(f"{joint.name}.place")
-        if at is None or not math.isfinite(place := float(clock.y[0][s.nq + s.nv + at])):
+        if at is None or not math.isfinite(place := float(clock.y.current[s.nq + s.nv + at])):
             continue
         if text := joint.end_message(numbers[joint.name], place):  # type: ignore[attr-defined]
             return f"at t = {float(clock.real.t):.6g} s {text}"
@@ -428,7 +428,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
     with np.errstate(all="ignore"):
         for k, e in enumerate(forces):
             if isinstance(e, Touch):
-                if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
+                if not math.isfinite(W.sensed.load[S.forces.load[k]]):
                     return f"the normal force of {e.title} is not finite"
                 continue
             F, M, par = (
@@ -453,7 +453,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
                     f"{f', as {part}' if part else ''}. Look for a division by zero or a range that it leaves"
                     f"{_law_texts(e)}"
                 )
-            pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
+            pressed = W.sensed.load[S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
             out = (
                 e.effort(par, x, y, laws, pressed)
                 if isinstance(e, CoordinateForce)
@@ -477,7 +477,7 @@ def _extrapolated_fault(a: Assembly, clock: ex.StepState) -> str:
     """Return a message on a force or controller that is not finite where the present rates lead; empty if there is
     none.
     """
-    c, t, y, rates = a.compiled, float(clock.real.t), clock.y[ex.CURRENT], clock.K[0]
+    c, t, y, rates = a.compiled, float(clock.real.t), clock.y.current, clock.K[0]
     if not np.isfinite(y).all() or not np.isfinite(rates).all():
         return ""
     s, z = c.structure, c.z
@@ -502,7 +502,7 @@ def _law_texts(e: Element) -> str:
 
 def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
     """Name the elements whose rows allow no accelerations where the motion stopped; empty if there are none."""
-    t, y, own, c = float(clock.real.t), clock.y[0], a.compiled, base.compiled
+    t, y, own, c = float(clock.real.t), clock.y.current, a.compiled, base.compiled
     if not len(c.structure.rows) or not np.isfinite(y).all():
         return ""
     nq, nv = own.structure.nq, own.structure.nv
@@ -575,7 +575,7 @@ def _fastest_component(clock: ex.StepState) -> int:
     """Return the state component whose derivative changed most within the last step, relative to its tolerance."""
     n = clock.count.controlled
     with np.errstate(all="ignore"):
-        allowed = clock.real.atol * clock.y[ex.UNIT, :n] + clock.real.rtol * np.abs(clock.y[0, :n])
+        allowed = clock.real.atol * clock.y.unit[:n] + clock.real.rtol * np.abs(clock.y.current[:n])
         change = np.ptp(clock.K[:, :n], axis=0) / allowed
     return int(np.argmax(np.nan_to_num(change)))
 

@@ -33,7 +33,7 @@ from ..tables.law_inputs import forces_in_events, nonsmooth_elements
 from ..tables.reference_configuration import BodyState
 from ..tables.structure import is_outdated
 from ..tables.structure_definition import Structure, velocity_names
-from ..tables.table_definitions import COUPLED, POINT, VALUE
+from ..tables.table_definitions import COUPLED, POINT
 from ..tables.values import values_of
 from .integration_intervals import Segment, whole_motion
 from .solver_switching import CodeSelection, StiffnessMonitor
@@ -396,7 +396,7 @@ def _restore_modes(before: Result, a: Assembly) -> None:
         return
     last = before.phases.all[-1]
     W.modes.mode[:], W.modes.hold[:] = last.modes.mode, last.modes.hold
-    W.sensed[VALUE, W.sensed.shape[1] - len(s.switches) :] = last.sigma if last.sigma.ndim == 1 else last.sigma[:, -1]
+    W.sensed.value[W.sensed.shape[1] - len(s.switches) :] = last.sigma if last.sigma.ndim == 1 else last.sigma[:, -1]
 
 
 def add_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:

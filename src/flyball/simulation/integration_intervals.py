@@ -235,7 +235,7 @@ class SmoothIntervals:
         real, t = self.clock.real, float(self.times[self.at])
         if self.sharp[self.at]:
             behind = t + rounding_margin(t)
-            self.clock.y[ex.CURRENT] += (behind - real.t) * self.clock.K[0]
+            self.clock.y.current += (behind - real.t) * self.clock.K[0]
             real.t = behind
             self.clock.count.started = ex.FORCES_JUMPED
             real.h = max(real.h, real.wide)  # the last one was cut short

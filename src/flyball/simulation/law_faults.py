@@ -27,7 +27,7 @@ from ..model.table import Table
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import TABLEAUX, Tableau, tableau
 from ..tables.law_inputs import element_laws
-from ..tables.table_definitions import RATE, VALUE, assign
+from ..tables.table_definitions import assign
 
 LAW_SAMPLES = 257  # times at which the arguments of tables are checked
 
@@ -132,7 +132,7 @@ def law_inputs(c: CompiledMechanism, k: int) -> tuple[float, float]:
     S, W, e = c.values.system, c.work, c.structure.forces[k]
     F, M = S.forces.F[k], S.forces.M[k]
     if isinstance(e, CoordinateForce):
-        return float(W.sensed[VALUE, F]), float(W.sensed[RATE, F])
+        return float(W.sensed.value[F]), float(W.sensed.rate[F])
     x, y = e.inputs(force_row(S.force_parameters, k), load_record(W.FK, F), load_record(W.FK, M))
     return float(x), float(y)
 
@@ -152,7 +152,7 @@ def undefined_law_part(c: CompiledMechanism, element: Element, t: float, given: 
         Values of the inputs of a force's laws.
     """
     s = c.structure
-    values = {name: float(c.work.sensed[VALUE, at]) for name, at in s.slots.items()}
+    values = {name: float(c.work.sensed.value[at]) for name, at in s.slots.items()}
     values |= dict(zip(s.model.parameters, c.values.system.const.tolist(), strict=False)) | {"t": t}
     tables = {x.name: x for x in s.model.tables}
     for owner, law, inputs in element_laws(s.model):
@@ -215,7 +215,7 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
     step = float(clock.real.step)
     if not step > 0.0 or method not in TABLEAUX:
         return ""
-    grown = np.r_[_growth(a, clock.y[ex.CURRENT]), _growth(a, clock.y[ex.PROPOSED])]
+    grown = np.r_[_growth(a, clock.y.current), _growth(a, clock.y.proposed)]
     if not len(grown) or not grown.max() > LARGE_GROWTH:
         return ""
     longest, rate = longest_stable(a, tableau(method))
@@ -230,7 +230,7 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
 
 def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
     """Return a message on a state variable that has grown beyond all bounds; empty if there is none."""
-    y, grown = clock.y[ex.CURRENT], _growth(a, clock.y[ex.CURRENT])
+    y, grown = clock.y.current, _growth(a, clock.y.current)
     if not len(grown) or not grown.max() > UNBOUNDED_GROWTH:
         return ""
     i = int(np.argmax(grown))
@@ -252,7 +252,7 @@ def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) 
         return ""
     if text := _unbounded_law(a, clock):
         return text
-    y, rate, n = clock.y[ex.CURRENT], clock.K[0], _state_length(a)
+    y, rate, n = clock.y.current, clock.K[0], _state_length(a)
     first = s.nq + s.nv if s.rows else 0
     with np.errstate(all="ignore"):
         part = np.nan_to_num(np.abs(rate[first:n]) * clock.real.h / np.abs(y[first:n]))
@@ -270,7 +270,7 @@ def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
     """Return a message on a force whose law has grown and changes by more than `ESCAPING` of itself within a narrow
     step.
     """
-    c, t, h, y = a.compiled, float(clock.real.t), float(clock.real.h), clock.y[ex.CURRENT]
+    c, t, h, y = a.compiled, float(clock.real.t), float(clock.real.h), clock.y.current
     if not np.isfinite(y).all():
         return ""
     s, S, begun, now = c.structure, c.values.system, c.again(), c.again()
@@ -280,7 +280,7 @@ def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
         other.at(at, state[: s.nq].copy(), state[s.nq : s.nq + s.nv].copy(), MOTION)
     W, stack, n = now.work, np.zeros_like(c.work.stack), count_measured(S)
     later = W.sensed.copy()
-    later[VALUE, :n] += h * W.sensed[RATE, :n]
+    later.value[:n] += h * W.sensed.rate[:n]
     for k, e in enumerate(s.forces):
         if isinstance(e, Touch):
             continue
@@ -359,7 +359,7 @@ def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
     other = c.again()
     assign(other.work.modes, c.work.modes)
     assign(other.work.options, c.work.options)
-    other.work.sensed[VALUE] = c.work.sensed[VALUE]
+    other.work.sensed.value = c.work.sensed.value
 
     def rates(x: np.ndarray) -> np.ndarray:
         status, dy = evaluate_state(other.values.system, other.work, a.t, x, MOTION)

@@ -61,7 +61,7 @@ def idle_clock(ny: int, t: float = 0.0) -> ex.StepState:
     real = ex.StepReals.blank()
     real.t = t
     none = np.zeros(0, np.int64)
-    count, y, K = ex.StepCounts.blank(), np.zeros((ex.STATE_ROWS, ny)), np.zeros((1, ny))
+    count, y, K = ex.StepCounts.blank(), ex.StateVectors.blank(ny), np.zeros((1, ny))
     return ex.StepState(real, count, np.zeros(0), y, K, none, np.zeros((INSPECTION_ROWS, 0)))
 
 
@@ -139,7 +139,7 @@ def make_result(
     parts = zip(cuts, (*cuts[1:], rows.shape[1]), strict=True)
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(rows[:, a:b]) for a, b in parts)
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
-    result.final = (t, clock.y[0].copy())
+    result.final = (t, clock.y.current.copy())
     result.deferred_works, result.deferred_accelerations = deferred, unsolved and partial(unsolved, health)
     result.wound, result.begun = start.wound, start_record(start)
     result.carried |= continuation_data(here)

@@ -25,7 +25,6 @@ from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
 from ..results.result import Result
 from ..tables.constraint_rows import SwitchSpec
-from ..tables.table_definitions import VALUE
 from .initial_state import InitialState
 
 MOST_STARTS = 4  # cached answers of `leaves_no_freedom` for one set of values
@@ -80,7 +79,7 @@ def deferred_works(start: InitialState, clock: ex.StepState, rows: np.ndarray) -
     """
     at = 1 + clock.integrals
     s = start.assembly.compiled.structure
-    states, final = at_outputs(clock, rows)[:, 1 + s.nq + s.nv :][:, : len(s.states)].copy(), clock.y[0].copy()
+    states, final = at_outputs(clock, rows)[:, 1 + s.nq + s.nv :][:, : len(s.states)].copy(), clock.y.current.copy()
     if len(rows) and len(at):
         works = start.y[clock.integrals] + _works(start.assembly, clock, rows)
         states[:, clock.integrals - s.nq - s.nv] = works[np.isin(rows[:, 0], clock.times)]
@@ -259,7 +258,7 @@ def _switch_history(result: Result) -> SwitchHistory:
     for k, t in enumerate(result.t.tolist()):
         c.at(t, result.q[k].copy(), result.v[k].copy())
         for n, spec in enumerate(specs):
-            x[n, k] = c.work.sensed[VALUE, spec.measured]
+            x[n, k] = c.work.sensed.value[spec.measured]
             rate[n, k] = _quantity_rate(c, spec, result.v[k])
     numbers = c.values.system.switch_numbers
     bounds = np.stack([numbers.lower[which], numbers.upper[which]], axis=1)

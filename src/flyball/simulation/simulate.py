@@ -265,7 +265,7 @@ def clock_for(
     count.quota = 50
     count.limit = o.max_steps
     count.controlled, count.positions = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
-    Y = np.zeros((ex.STATE_ROWS, len(y)))
+    Y = ex.StateVectors.blank(len(y))
     Y[0] = y
     array("options").stabilization = STABILIZATION[o.stabilization]
     array("options").alpha, array("options").beta = o.alpha or 0.0, o.beta or 0.0
@@ -286,8 +286,8 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism) -> Non
     real.energy_size = energy_scale(base, float(real.span))
     rate = c.array("options").rate = characteristic_rate_within(c.values.system, float(real.span))
     nq, nv = c.structure.nq, c.structure.nv
-    clock.y[ex.UNIT] = c.values.cache.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
-    clock.y[ex.UNIT, nq : nq + nv] *= rate
+    clock.y.unit = c.values.cache.get("units of the state", None, 1, lambda: state_units(c, clock.y.shape[1]))
+    clock.y.unit[nq : nq + nv] *= rate
     loose = real.atol + real.rtol
     near = loose * min(1.0, loose / TIGHT_TOLERANCE)
     c.array("options").position_tolerance = length * min(COARSEST_POSITIONS, max(TIGHT_G, STAGE_POSITIONS * near))

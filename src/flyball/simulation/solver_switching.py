@@ -31,7 +31,7 @@ from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.explicit_runge_kutta import reset_rejections, scaled_norm
 from ..tables.coordinate_choice import right_hand_side_cost
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import VALUE, assign, named_arrays
+from ..tables.table_definitions import assign, named_arrays
 from ..tables.values import Values
 
 AUTO_CODE = "auto"
@@ -486,7 +486,7 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
     pace : float
         Estimated rate [1/s], by which velocities are scaled to positions.
     """
-    s, y = c.structure, clock.y[ex.CURRENT]
+    s, y = c.structure, clock.y.current
     n, parts = s.nq + s.nv + len(s.controls) - len(s.sampled), [slice(0, s.nq), slice(s.nq, s.nq + s.nv)]
     if n > s.nq + s.nv:
         parts.append(slice(s.nq + s.nv, n))
@@ -514,16 +514,14 @@ def rate_change(clock: ex.StepState) -> float:
     Divided by the fastest rate this bounds the amplitude of an oscillation of that frequency.
     """
     y = clock.y
-    return float(
-        scaled_norm(clock, clock.K[0] - y[ex.PREVIOUS_RATE], np.abs(y[ex.CURRENT]), int(clock.count.controlled))
-    )
+    return float(scaled_norm(clock, clock.K[0] - y.previous_rate, np.abs(y.current), int(clock.count.controlled)))
 
 
 def _rate_function(c: CompiledMechanism, t: float, n: int) -> Callable[[np.ndarray], np.ndarray]:
     other = c.again()
     assign(other.work.modes, c.work.modes)
     assign(other.work.options, c.work.options)
-    other.work.sensed[VALUE] = c.work.sensed[VALUE]
+    other.work.sensed.value = c.work.sensed.value
 
     def rates(x: np.ndarray) -> np.ndarray:
         status, dy = evaluate_state(other.values.system, other.work, t, x.copy(), MOTION)

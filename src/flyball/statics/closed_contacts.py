@@ -11,20 +11,6 @@ from ..assembly.assembled_state import Assembly
 from ..collision import shape_kinds
 from ..collision.contact_finder import ContactFinder
 from ..collision.tables import (
-    AXES,
-    COUNT,
-    FIRST,
-    FOUND,
-    GAP,
-    KIND,
-    MATERIAL,
-    MOVER,
-    NORMAL,
-    PAR,
-    PLACE,
-    POINT,
-    SHAPE_1,
-    SHAPE_2,
     Geometry,
 )
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
@@ -122,24 +108,23 @@ def find_closed_contacts(model: Model, at: Assembly) -> ContactState:
     size = smallest_radius(scene, at.compiled.values)
     finder = ContactFinder(scene.geometry, margin=CLOSED_GAP * size)
     C = finder.find(movers_of_assembly(scene, Assembly(at.compiled, at.t, at.q, 0.0 * at.v)), rebuild=True)
-    rows = [k for k in range(int(C.count[FOUND])) if C.x[k, GAP] <= CLOSED_GAP * size]
-    pairs = [(scene.name(int(C.at[k, SHAPE_1])), scene.name(int(C.at[k, SHAPE_2]))) for k in rows]
+    rows = [k for k in range(int(C.count.found)) if C.x.gap[k] <= CLOSED_GAP * size]
+    pairs = [(scene.name(int(C.at.shape_1[k])), scene.name(int(C.at.shape_2[k]))) for k in rows]
     out = []
     for n, k in enumerate(rows):
-        i, j = (int(s) for s in C.at[k, [SHAPE_1, SHAPE_2]])
+        i, j = int(C.at.shape_1[k]), int(C.at.shape_2[k])
         name = "-".join(pairs[n]) + (f"-{pairs[:n].count(pairs[n]) + 1}" if pairs.count(pairs[n]) > 1 else "")
         a, b = (_carrier_name(scene, s) for s in (i, j))
-        mu = float(scene.surfaces.pair[scene.geometry.shape_i[i, MATERIAL], scene.geometry.shape_i[j, MATERIAL], 0])
-        x = C.x[k]
+        mu = float(scene.surfaces.pair[scene.geometry.shape.material[i], scene.geometry.shape.material[j], 0])
         out.append(
-            StaticContact(name, (i, j), (a, b), pairs[n], x[POINT : POINT + 3].copy(), x[NORMAL : NORMAL + 3].copy(),
-                   float(x[GAP]), mu)
+            StaticContact(name, (i, j), (a, b), pairs[n], C.x.point[k].copy(), C.x.normal[k].copy(),
+                   float(C.x.gap[k]), mu)
         )  # fmt: skip
     return ContactState(at, scene, bodies, tuple(out))
 
 
 def _carrier_name(scene: ContactTables, shape: int) -> str:
-    mover = int(scene.geometry.shape_i[shape, MOVER])
+    mover = int(scene.geometry.shape.mover[shape])
     return GROUND if mover < 0 else scene.carriers.name(mover)
 
 
@@ -215,15 +200,15 @@ def surface_form(G: Geometry, M: Movers, shape: int, point: np.ndarray, normal: 
     """
     p, R = _shape_pose(G, M, shape)
     x, n = R.T @ (point - p), R.T @ normal
-    kind, par = int(G.shape_i[shape, KIND]), G.shape_x[shape, PAR:]
+    kind, par = int(G.shape.kind[shape]), G.dimensions.par[shape]
     form, centre, radius = _local_form(G, shape, kind, par, x, n)
     return SurfaceForm(form, p + R @ centre, R[:, 2], radius)
 
 
 def _shape_pose(G: Geometry, M: Movers, shape: int) -> tuple[np.ndarray, np.ndarray]:
     """Origin and axes of a shape in the world."""
-    p, R = G.shape_x[shape, PLACE : PLACE + 3], G.shape_x[shape, AXES : AXES + 9].reshape(3, 3)
-    mover = int(G.shape_i[shape, MOVER])
+    p, R = G.dimensions.place[shape], G.dimensions.axes[shape].reshape(3, 3)
+    mover = int(G.shape.mover[shape])
     if mover < 0:
         return p, R
     q, T = M.pose[mover, :3], M.pose[mover, 3:].reshape(3, 3)
@@ -276,7 +261,7 @@ def _hull_form(
     G: Geometry, shape: int, kind: int, radius: float, x: np.ndarray, n: np.ndarray
 ) -> tuple[str, np.ndarray, float]:
     """Form of a hull or polygon, by the number of corners that are farthest along the normal."""
-    first, count = int(G.shape_i[shape, FIRST]), int(G.shape_i[shape, COUNT])
+    first, count = int(G.shape.first[shape]), int(G.shape.count[shape])
     corner = G.vertex[first : first + count]
     reach = corner @ n
     far = corner[reach >= reach.max() - SHAPE_TOLERANCE * np.ptp(corner, axis=0).max()]

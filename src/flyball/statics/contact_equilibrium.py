@@ -41,7 +41,7 @@ from ..simulation.impulse_stepping.setup import (
     values_with_stops,
 )
 from ..simulation.impulse_stepping.stepper import NoSolution, Stepper
-from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION, RESTITUTION_LAW, TIME
+from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping
 from ..tables.contact_tables import ContactTables, contact_tables
 from ..tables.structure_definition import velocity_names
@@ -99,10 +99,10 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
     still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)
     if held:
         own = held.start.assembly.compiled
-        held.joints.clock.y[0, : own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
+        held.joints.clock.y.current[: own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
     try:
         stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, held)
-        stepper.pace.count[RESTITUTION_LAW] = NO_RESTITUTION
+        stepper.state.options.restitution_law = NO_RESTITUTION
         _Settling(scene, stepper, held, h, base).walk(model.name)
     except NoSolution:
         raise AnalysisError(
@@ -163,7 +163,7 @@ class _Settling:
 
     def _step(self) -> None:
         s = self.stepper
-        s.pace.real[TIME] = self.t
+        s.state.times.now = self.t
         s.joints.real.time = self.t
         s.run(1, self.h)
 
@@ -190,7 +190,7 @@ class _Settling:
     def _mechanism_velocities(self) -> np.ndarray:
         """View of the velocities of the mechanism."""
         own = self._mechanism().structure
-        return self.stepper.joints.clock.y[0, own.nq : own.nq + own.nv]
+        return self.stepper.joints.clock.y.current[own.nq : own.nq + own.nv]
 
     def _speeds(self) -> dict[str, float]:
         """Speed of every body [m/s]: of its centre, and of its rotation at the radius of gyration."""

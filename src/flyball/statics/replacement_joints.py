@@ -38,7 +38,6 @@ from ..model.unsupported_elements import unsupported_elements
 from ..results.result import Result
 from ..simulation.impulse_stepping.setup import movers_of_assembly
 from ..tables.structure_definition import FrameSpec
-from ..tables.table_definitions import VALUE
 from ..tables.values import Values
 from .closed_contacts import (
     BALL,
@@ -190,7 +189,7 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
     c.at(at.t, q, v)
     S = c.values.system
     for k, x in enumerate(c.structure.switches):
-        value = float(c.work.sensed[VALUE, x.measured])
+        value = float(c.work.sensed.value[x.measured])
         size = 1.0 if _is_rotation(model, x.element, x.switch) else c.values.length
         lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
         sign = x.switch.kind.push_direction(value, (lower, upper), CLOSED_GAP * size)
@@ -234,7 +233,7 @@ def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[st
     s, S, W = c.structure, c.values.system, c.work
     k = next(i for i, f in enumerate(s.forces) if f is e)
     par, first = force_row(S.force_parameters, k), int(S.forces.laws[k, 0])
-    x, load, law = float(W.sensed[VALUE, S.forces.F[k]]), 0.0, 0.0
+    x, load, law = float(W.sensed.value[S.forces.F[k]]), 0.0, 0.0
     if S.forces.load[k] >= 0:
         load = float(e.load(par, record(W.FK, int(S.forces.M[k])), *reaction(e.joint)))
     if first >= 0:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..collision import shape_kinds
-from ..collision import tables as ct
 from ..constraints import ball_on_box, corner_on_box, displacement, rolling
 from ..forces.limit import Limit
 from ..model.body import GROUND
@@ -81,7 +80,7 @@ def contact_places(model: Model, given: ElementNumbers) -> ContactPlaces:
     scene = contact_tables(model, given, [b.name for b in model.bodies])
     found: list[tuple[str, dict]] = []
     why_not: dict[str, None] = {}
-    for i, j in itertools.combinations(range(len(scene.geometry.shape_i)), 2):
+    for i, j in itertools.combinations(range(len(scene.geometry.shape)), 2):
         row = _pair_properties(scene, i, j)
         if row is None:
             continue
@@ -116,14 +115,14 @@ def _with_unique_names(model: Model, found: list[tuple[str, dict]]) -> list[tupl
 
 def _pair_properties(scene: ContactTables, i: int, j: int) -> np.ndarray | None:
     """Contact properties of the surfaces of two shapes, if they may touch."""
-    x = scene.geometry.shape_i
-    a, b = int(x[i, ct.MOVER]), int(x[j, ct.MOVER])
+    x = scene.geometry.shape
+    a, b = int(x.mover[i]), int(x.mover[j])
     apart = scene.geometry.apart
-    if a == b or not (x[i, ct.MASK] & x[j, ct.MEMBER] and x[j, ct.MASK] & x[i, ct.MEMBER]):
+    if a == b or not (x.mask[i] & x.member[j] and x.mask[j] & x.member[i]):
         return None
     if len(apart) and (apart == (min(a, b), max(a, b))).all(axis=1).any():
         return None
-    row = scene.surfaces.pair[x[i, ct.MATERIAL], x[j, ct.MATERIAL]]
+    row = scene.surfaces.pair[x.material[i], x.material[j]]
     return None if np.isnan(row[su.STATIC]) else row
 
 
@@ -140,16 +139,16 @@ def _unsupported_surface(surfaces: Surfaces, row: np.ndarray, shapes: tuple[int,
 
 def _placed_shape(scene: ContactTables, k: int) -> _PlacedShape:
     G = scene.geometry
-    p, R = G.shape_x[k, ct.PLACE : ct.PLACE + 3], G.shape_x[k, ct.AXES : ct.AXES + 9].reshape(3, 3)
-    mover = int(G.shape_i[k, ct.MOVER])
+    p, R = G.dimensions.place[k], G.dimensions.axes[k].reshape(3, 3)
+    mover = int(G.shape.mover[k])
     body = GROUND
     if mover >= 0:
         pose = scene.carriers.movers.pose[mover]
         T = pose[3:].reshape(3, 3)
         p, R, body = pose[:3] + T @ p, T @ R, scene.carriers.name(mover)
-    first, count = int(G.shape_i[k, ct.FIRST]), int(G.shape_i[k, ct.COUNT])
-    kind = int(G.shape_i[k, ct.KIND])
-    return _PlacedShape(body, scene.name(k), kind, G.shape_x[k, ct.PAR :], p, R, G.vertex[first : first + count])
+    first, count = int(G.shape.first[k]), int(G.shape.count[k])
+    kind = int(G.shape.kind[k])
+    return _PlacedShape(body, scene.name(k), kind, G.dimensions.par[k], p, R, G.vertex[first : first + count])
 
 
 def _pair_places(planar: bool, a: _PlacedShape, b: _PlacedShape) -> list[dict] | str:

@@ -194,7 +194,7 @@ def check_curvature(G: ct.Geometry, pair: np.ndarray, materials: Sequence[str], 
     ModelError
         If two shapes of the pair are not a sphere and a sphere or something flat.
     """
-    of = [set(G.shape_i[G.shape_i[:, ct.MATERIAL] == k, ct.KIND].tolist()) for k in range(len(pair))]
+    of = [set(G.shape.kind[G.shape.material[:] == k].tolist()) for k in range(len(pair))]
     balls = {shape_kinds.SPHERE}
     for a, b in np.argwhere(pair[:, :, su.MODULUS] > 0.0):
         if planar or balls not in (of[a], of[b]) or not of[a] | of[b] <= {*balls, *FLAT_KINDS}:

@@ -197,7 +197,7 @@ class ContactTables:
 
     def name(self, shape: int) -> str:
         """Name of a shape's owner, for messages: ``"floor"``, ``"crank"``, ``"balls[17]"``."""
-        mover = int(self.geometry.shape_i[shape, ct.MOVER])
+        mover = int(self.geometry.shape.mover[shape])
         return self.parts[self.part[shape]] if mover < 0 else self.carriers.name(mover)
 
 
@@ -232,8 +232,8 @@ def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) ->
         sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.excluded_pairs), np.int64
     ).reshape(-1, 2)
     geometry = ct.Geometry(
-        _concatenated(rows.ints, (0, 9), np.int64),
-        _concatenated(rows.reals, (0, 24)),
+        np.concatenate([ct.Shapes.blank(0), *rows.ints]).view(ct.Shapes),
+        np.concatenate([ct.Dimensions.blank(0), *rows.reals]).view(ct.Dimensions),
         _concatenated(rows.vertex, (0, 3)),
         _concatenated(rows.face, (0,), np.int64),
         apart,
@@ -278,16 +278,16 @@ class _ShapeRows:
         where, movers, sizes, com = self._frame(e)
         forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(e, s)]
         count, n = len(movers), len(forms)
-        ints, reals = np.zeros((count, n, 9), np.int64), np.zeros((count, n, 24))
+        ints, reals = ct.Shapes.blank(count, n), ct.Dimensions.blank(count, n)
         mine = np.zeros((n, 2, 3))
         for j, (s, form) in enumerate(forms):
             f = form if where is None else form.transformed(*where)
             reals[:, j] = _shape_numbers(f, com, sizes, self._places)
             ints[:, j] = self._ints(e, s, f, sizes)
             mine[j] = self._surface_velocity(e, s, where)
-        ints[:, :, ct.MOVER] = movers[:, None]
-        self.ints.append(ints.reshape(-1, 9))
-        self.reals.append(reals.reshape(-1, 24))
+        ints.mover = movers[:, None]
+        self.ints.append(ints.reshape(-1, ct.Shapes.layout.width))
+        self.reals.append(reals.reshape(-1, ct.Dimensions.layout.width))
         self.own.append(np.broadcast_to(mine, (count, n, 2, 3)).reshape(-1, 2, 3))
         self.part.append(np.full(count * n, k))
         self.code += [None if f.owner is None else code_table(f.owner, SUPPORT_SIGNATURES) for _, f in forms] * count
@@ -316,23 +316,23 @@ class _ShapeRows:
     def _ints(self, e: Owner, s: Solid, f: ConvexPart, sizes: np.ndarray) -> np.ndarray:
         """Integers of a shape: kind, first corners and faces, group and surface; each size has corners of its own."""
         group, material = self.groups.of[e.name], s.material or e.material
-        row = np.zeros((len(sizes), 9), np.int64)
-        row[:, ct.KIND] = getattr(shape_kinds, f.kind)
-        row[:, ct.COUNT] = len(f.vertex) if f.corners is None else f.corners
-        row[:, ct.FACE_COUNT] = f.sides
-        row[:, ct.FIRST], row[:, ct.FACE_FIRST] = self._corners, self._places
+        row = ct.Shapes.blank(len(sizes))
+        row.kind[:] = getattr(shape_kinds, f.kind)
+        row.count[:] = len(f.vertex) if f.corners is None else f.corners
+        row.face_count[:] = f.sides
+        row.first[:], row.face_first[:] = self._corners, self._places
         if len(f.vertex):
             other = (sizes != sizes[0]).any()
-            row[:, ct.FIRST] += len(f.vertex) * np.arange(len(sizes)) if other else 0
+            row.first[:] += len(f.vertex) * np.arange(len(sizes)) if other else 0
             self.vertex.append(f.grown(sizes if other else sizes[:1])[1])
             self.face.append(np.asarray(f.face, np.int64))
             self._corners += len(self.vertex[-1])
             self._places += len(f.face)
-        row[:, ct.MEMBER], row[:, ct.MASK] = 1 << group, self.groups.meets(group)
+        row.member[:], row.mask[:] = 1 << group, self.groups.meets(group)
         surface = group, material
         on = self.surfaces.setdefault(surface, set())
         on |= {GROUND} if isinstance(e, Ground) else {e.name, f"{e.name}[1]"} if len(sizes) > 1 else {e.name}
-        row[:, ct.MATERIAL] = list(self.surfaces).index(surface)
+        row.material[:] = list(self.surfaces).index(surface)
         return row
 
     def _surface_velocity(self, e: Owner, s: Solid, where: tuple | None) -> np.ndarray:
@@ -343,11 +343,11 @@ class _ShapeRows:
 
 def _shape_numbers(f: ConvexPart, com: np.ndarray, sizes: np.ndarray, places: int) -> np.ndarray:
     """Numbers of a shape: pose in the mover, parameters, radius; the edges of a hull are counted from all faces."""
-    row = np.zeros((len(sizes), 24))
-    row[:, ct.PLACE : ct.PLACE + 3] = sizes[:, None] * (np.real(f.place) - com)
-    row[:, ct.AXES : ct.AXES + 9] = np.real(f.axes).ravel()
-    row[:, ct.PAR : ct.PAR + len(f.par)] = replace(f, vertex=np.zeros((0, 3))).grown(sizes)[0]
+    row = ct.Dimensions.blank(len(sizes))
+    row.place = sizes[:, None] * (np.real(f.place) - com)
+    row.axes = np.real(f.axes).ravel()
+    row.par[:, : len(f.par)] = replace(f, vertex=np.zeros((0, 3))).grown(sizes)[0]
     if f.kind == "HULL" and f.par[1] >= 0:
-        row[:, ct.PAR + 1] += places
-    row[:, ct.RADIUS] = sizes * np.real(f.reach)
+        row.par[:, 1] += places
+    row.radius[:] = sizes * np.real(f.reach)
     return row

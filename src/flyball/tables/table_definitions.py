@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..compiler.struct_layout import COMPLEX, CodeTables1, Float2, Float3, Int1, Int2, Number1, Number2, Record
+from ..compiler.struct_layout import COMPLEX, CodeTables1, Column, Float2, Float3, Int1, Int2, Number1, Number2, Record
 from ..constraints.registry import BY_ADDRESS
 from ..numerics.sparse_factorisation import LDLPattern
 
@@ -24,13 +24,6 @@ BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
 FORCE_BY_ADDRESS = 1000  # kind of forces with a code table: not the number of a built-in element
 # directions of zero crossings
 FALLING, EITHER, RISING = -1, 0, 1
-# rows of Work.sensed: of each measured quantity; then, in separate columns, of its rate as a value
-VALUE, RATE, BIAS = range(3)
-# in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
-# scratch; and the inverse Jacobian of the gaps. Then forces that events name (`loads.update_readings`). Then value,
-# rate and its rate of each controller's state (`rows.controller_column`). Then, in row VALUE, the direction of each
-# switch (`rows.direction_column`)
-LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, BROYDEN_PRODUCT, BROYDEN_ROW, INVERSE_JACOBIAN = range(7)
 # entries of System.flat: the length of Work.flat, then addresses; `engine/calls.py` describes each
 SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE, FINISH, DRIFT, SHOW, SAMPLED, FLAT = (
     range(15)
@@ -398,6 +391,26 @@ class Counts(Record, kind="Int"):
     exchanges: int  # exchanges of dependent coordinates
 
 
+class Sensed(Record, kind="Number", vectors=True):
+    """What laws and switches read.
+
+    Its columns: the measured quantities; the rates of these as values; the loads of joints; forces that events name
+    (`loads.update_readings`); controllers' states (`rows.controller_column`); the direction of each switch, which has a
+    value only (`rows.direction_column`). Loads, in their columns, have entries of their own, and further rows with the
+    inverse Jacobian of their gaps.
+    """
+
+    value: Column
+    rate: Column
+    bias: Column  # second derivative, without that by accelerations; of controllers the rate of the rate
+    gap_before: Column  # gap of a load in the pass before
+    broyden_product: Column  # scratch
+    broyden_row: Column
+    load: Annotated[np.ndarray, "value"]  # of a joint, now
+    returned: Annotated[np.ndarray, "rate"]  # load that follows from the reactions
+    load_before: Annotated[np.ndarray, "bias"]  # of the pass before
+
+
 class Work(NamedTuple):
     """Workspace of one run on one thread: nothing is allocated inside the loops."""
 
@@ -413,9 +426,7 @@ class Work(NamedTuple):
     T: Number2  # (nt, 6): wrench of each term on M, where loads are needed; else (0, 6)
     rows: RowScratch
     velocities: VelocityScratch
-    # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias of measured quantities; loads; forces; controllers;
-    # directions
-    sensed: Number2
+    sensed: Sensed  # (2 nm + nl + ne + nc + nw)
     modes: Modes
     A: Number1  # matrix to be factored
     L: Number1  # its factor

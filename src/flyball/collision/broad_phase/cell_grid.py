@@ -11,38 +11,11 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ..shape_kinds import SPHERE
-from ..tables import AHEAD, KIND, MOVER
 from .envelopes import store_axes, update_axes, update_motion, write_envelope
 from .workspace import (
-    BOUNDED,
-    CELL_EDGE,
-    ENVELOPE_BOUND,
-    ENVELOPES_RENEWED,
-    FRAME_LAG,
-    FRAME_ORIGIN,
-    FRAME_STEP,
-    FRAME_VELOCITY,
-    GRID_CORNER,
-    INVERSE_EDGE,
     IS_GENERIC,
     IS_SPHERE,
-    LAYER_STRIDE,
-    LEVEL_CLASS,
-    LEVEL_FIRST,
-    LEVEL_MASK,
-    LEVEL_SHAPES,
-    LEVELS,
-    MIDDLE,
-    RAW_BOUND,
-    RAW_ENVELOPE,
-    ROW_STRIDE,
     SIZE_LEVELS,
-    SLOT_CLASS,
-    SLOT_FORM,
-    SLOT_LEVEL,
-    SLOT_MOVER,
-    SLOT_SHAPE,
-    TYPICAL_RADIUS,
 )
 
 SMALLEST_EDGE = 1e-6  # smallest edge of a cell, in typical radii: shapes may be points
@@ -53,7 +26,7 @@ KEY_BITS, KEY_MASK = 21, (1 << 21) - 1
 @formula
 def cell_index(B, l, c, x):
     """Return the number of the cell along axis c at level l."""
-    k = (x - B.level_x[l, GRID_CORNER + c]) * B.level_x[l, INVERSE_EDGE]
+    k = (x - B.level_grid.corner[l, c]) * B.level_grid.inverse_edge[l]
     k = min(FARTHEST_CELL, max(-FARTHEST_CELL, k))
     whole = int(k)
     return whole - 1 if k < whole else whole
@@ -68,8 +41,8 @@ def cell_key(a, b, c):
 @formula
 def bucket_of_cell(B, l, a, b, c):
     """Bucket of a cell in `Search.head`; cells of a row have adjacent buckets."""
-    k = a + B.level_i[l, ROW_STRIDE] * b + B.level_i[l, LAYER_STRIDE] * c
-    return B.level_i[l, LEVEL_FIRST] + (k & B.level_i[l, LEVEL_MASK])
+    k = a + B.level_cells.row_stride[l] * b + B.level_cells.layer_stride[l] * c
+    return B.level_cells.first[l] + (k & B.level_cells.mask[l])
 
 
 @formula
@@ -84,9 +57,9 @@ def size_level(largest, whole):
 @formula
 def group_extent(sums, g, c, edge):
     """Return the number of cells that a group covers along axis c (without distant shapes), and their start."""
-    n = sums[g, 0]
-    mean = sums[g, 2 + c] / n
-    spread = 6.0 * sqrt(max(0.0, sums[g, 5 + c] / n - mean * mean)) / edge
+    n = sums.count[g]
+    mean = sums.middle[g, c] / n
+    spread = 6.0 * sqrt(max(0.0, sums.square[g, c] / n - mean * mean)) / edge
     return 3.0 + min(spread, 1e6), mean - 0.5 * spread * edge
 
 
@@ -95,48 +68,48 @@ def lay_out_levels(B):
     """Define the levels from the sums over one class and size: `Search.level_i`, `level_x`; clears all buckets."""
     count, base = 0, 0
     for g in range(B.sums.shape[0]):
-        n = int(B.sums[g, 0])
+        n = int(B.sums.count[g])
         if n == 0:
             continue
-        edge = max(2.0 * B.sums[g, 1], SMALLEST_EDGE * B.real[TYPICAL_RADIUS])
-        B.level_x[count, CELL_EDGE], B.level_x[count, INVERSE_EDGE] = edge, 1.0 / edge
+        edge = max(2.0 * B.sums.largest[g], SMALLEST_EDGE * B.real.typical_radius)
+        B.level_grid.edge[count], B.level_grid.inverse_edge[count] = edge, 1.0 / edge
         places = 2
         while places < 2 * n:
             places *= 2
-        row, B.level_x[count, GRID_CORNER] = group_extent(B.sums, g, 0, edge)
-        rows, B.level_x[count, GRID_CORNER + 1] = group_extent(B.sums, g, 1, edge)
-        _, B.level_x[count, GRID_CORNER + 2] = group_extent(B.sums, g, 2, edge)
-        B.level_i[count, ROW_STRIDE] = int(row) | 1
-        B.level_i[count, LAYER_STRIDE] = B.level_i[count, ROW_STRIDE] * (int(rows) | 1)
-        B.level_i[count, LEVEL_CLASS], B.level_i[count, LEVEL_FIRST], B.level_i[count, LEVEL_MASK] = (
+        row, B.level_grid.corner[count, 0] = group_extent(B.sums, g, 0, edge)
+        rows, B.level_grid.corner[count, 1] = group_extent(B.sums, g, 1, edge)
+        _, B.level_grid.corner[count, 2] = group_extent(B.sums, g, 2, edge)
+        B.level_cells.row_stride[count] = int(row) | 1
+        B.level_cells.layer_stride[count] = B.level_cells.row_stride[count] * (int(rows) | 1)
+        B.level_cells.collision_class[count], B.level_cells.first[count], B.level_cells.mask[count] = (
             g // SIZE_LEVELS,
             base,
             places - 1,
         )
-        B.level_i[count, LEVEL_SHAPES] = n
-        B.sums[g, 8] = count
+        B.level_cells.shapes[count] = n
+        B.sums.level[g] = count
         base += places
         count += 1
     for k in range(base):
         B.head[k] = -1
-    B.count[LEVELS] = count
+    B.count.levels = count
     return base
 
 
 @formula
 def cell_of_slot(B, s, l):
     """Key and bucket of the cell of slot s at level l."""
-    a = cell_index(B, l, 0, B.envelope[s, MIDDLE])
-    b = cell_index(B, l, 1, B.envelope[s, MIDDLE + 1])
-    c = cell_index(B, l, 2, B.envelope[s, MIDDLE + 2])
+    a = cell_index(B, l, 0, B.envelope.middle[s, 0])
+    b = cell_index(B, l, 1, B.envelope.middle[s, 1])
+    c = cell_index(B, l, 2, B.envelope.middle[s, 2])
     return cell_key(a, b, c), bucket_of_cell(B, l, a, b, c)
 
 
 @formula
 def remove_from_cell(B, s):
     """Remove a slot from its cell (before its envelope changes)."""
-    l = B.slot[s, SLOT_LEVEL]
-    B.level_i[l, LEVEL_SHAPES] -= 1
+    l = B.slot.level[s]
+    B.level_cells.shapes[l] -= 1
     _, at = cell_of_slot(B, s, l)
     t = B.head[at]
     if t == s:
@@ -150,8 +123,8 @@ def remove_from_cell(B, s):
 @formula
 def insert_into_cell(B, s, l):
     """Insert a slot into its cell at level l."""
-    B.slot[s, SLOT_LEVEL] = l
-    B.level_i[l, LEVEL_SHAPES] += 1
+    B.slot.level[s] = l
+    B.level_cells.shapes[l] += 1
     B.key[s], at = cell_of_slot(B, s, l)
     B.link[s] = B.head[at]
     B.head[at] = s
@@ -161,9 +134,9 @@ def insert_into_cell(B, s, l):
 def finest_level(B, of, whole):
     """Finest level of a class for a shape of this size, or -1."""
     best = -1
-    for l in range(B.count[LEVELS]):
-        takes = B.level_i[l, LEVEL_CLASS] == of and 2.0 * whole <= B.level_x[l, CELL_EDGE]
-        if takes and (best < 0 or B.level_x[l, CELL_EDGE] < B.level_x[best, CELL_EDGE]):
+    for l in range(B.count.levels):
+        takes = B.level_cells.collision_class[l] == of and 2.0 * whole <= B.level_grid.edge[l]
+        if takes and (best < 0 or B.level_grid.edge[l] < B.level_grid.edge[best]):
             best = l
     return best
 
@@ -171,8 +144,8 @@ def finest_level(B, of, whole):
 @formula
 def neighbour_cells(B, s, l):
     """First and last cells along each axis that can contain partners of slot s at level l, and the number of cells."""
-    r = B.envelope[s, ENVELOPE_BOUND] + 0.5 * B.level_x[l, CELL_EDGE]
-    x, y, z = B.envelope[s, MIDDLE], B.envelope[s, MIDDLE + 1], B.envelope[s, MIDDLE + 2]
+    r = B.envelope.bound[s] + 0.5 * B.level_grid.edge[l]
+    x, y, z = B.envelope.middle[s, 0], B.envelope.middle[s, 1], B.envelope.middle[s, 2]
     a, d = cell_index(B, l, 0, x - r), cell_index(B, l, 0, x + r)
     b, e = cell_index(B, l, 1, y - r), cell_index(B, l, 1, y + r)
     c, f = cell_index(B, l, 2, z - r), cell_index(B, l, 2, z + r)
@@ -183,7 +156,7 @@ def neighbour_cells(B, s, l):
 @formula
 def scan_is_cheaper(B, many):
     """Whether testing every shape is cheaper than visiting this many cells."""
-    return many > 27.0 + B.count[BOUNDED]
+    return many > 27.0 + B.count.bounded
 
 
 @formula
@@ -194,22 +167,22 @@ def make_envelopes(G, M, B):
             B.sums[g, c] = 0.0
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
-            m = G.shape_i[i, MOVER]
-            update_motion(M, B, i, m, G.shape_i[i, KIND] == SPHERE, B.raw, i)
-            B.raw[i, RAW_BOUND] = write_envelope(B, B.raw, i, RAW_ENVELOPE, m < 0)
+            m = G.shape.mover[i]
+            update_motion(M, B, i, m, G.shape.kind[i] == SPHERE, B.raw_now, i)
+            B.raw_bound[i] = write_envelope(B, B.raw_now, B.raw_envelope, i, m < 0)
             first = B.shape_class[i] * SIZE_LEVELS
-            B.sums[first, 9] = max(B.sums[first, 9], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+            B.sums.largest_of_class[first] = max(B.sums.largest_of_class[first], B.raw_envelope.bound[i])
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
             g = B.shape_class[i] * SIZE_LEVELS
-            g += size_level(B.sums[g, 9], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+            g += size_level(B.sums.largest_of_class[g], B.raw_envelope.bound[i])
             B.mark[i] = g
-            B.sums[g, 0] += 1.0
-            B.sums[g, 1] = max(B.sums[g, 1], B.raw[i, RAW_BOUND])
+            B.sums.count[g] += 1.0
+            B.sums.largest[g] = max(B.sums.largest[g], B.raw_bound[i])
             for c in range(3):
-                x = B.raw[i, RAW_ENVELOPE + MIDDLE + c]
-                B.sums[g, 2 + c] += x
-                B.sums[g, 5 + c] += x * x
+                x = B.raw_envelope.middle[i, c]
+                B.sums.middle[g, c] += x
+                B.sums.square[g, c] += x * x
 
 
 @formula
@@ -217,10 +190,10 @@ def number_slots(B, places):
     """Assign slots by counting sort over the buckets: by shape, in ``moved``; ``head`` then holds the first slots."""
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
-            l = int(B.sums[B.mark[i], 8])
-            a = cell_index(B, l, 0, B.raw[i, RAW_ENVELOPE + MIDDLE])
-            b = cell_index(B, l, 1, B.raw[i, RAW_ENVELOPE + MIDDLE + 1])
-            B.moved[i] = bucket_of_cell(B, l, a, b, cell_index(B, l, 2, B.raw[i, RAW_ENVELOPE + MIDDLE + 2]))
+            l = int(B.sums.level[B.mark[i]])
+            a = cell_index(B, l, 0, B.raw_envelope.middle[i, 0])
+            b = cell_index(B, l, 1, B.raw_envelope.middle[i, 1])
+            B.moved[i] = bucket_of_cell(B, l, a, b, cell_index(B, l, 2, B.raw_envelope.middle[i, 2]))
             B.mark[i] = l
             B.head[B.moved[i]] += 1  # from -1
     total = 0
@@ -248,16 +221,16 @@ def fill_slots(G, M, B):
     for i in range(B.shape_class.shape[0]):
         if B.shape_class[i] >= 0:
             s = B.moved[i]
-            B.slot[s, SLOT_SHAPE], B.slot[s, SLOT_MOVER], B.slot[s, SLOT_LEVEL] = i, G.shape_i[i, MOVER], B.mark[i]
-            B.slot[s, SLOT_FORM] = IS_SPHERE if G.shape_i[i, KIND] == SPHERE else IS_GENERIC
-            B.slot[s, SLOT_CLASS] = B.shape_class[i]
+            B.slot.shape_index[s], B.slot.mover[s], B.slot.level[s] = i, G.shape.mover[i], B.mark[i]
+            B.slot.form[s] = IS_SPHERE if G.shape.kind[i] == SPHERE else IS_GENERIC
+            B.slot.collision_class[s] = B.shape_class[i]
             for c in range(8):
-                B.now[s, c], B.envelope[s, c] = B.raw[i, c], B.raw[i, RAW_ENVELOPE + c]
-            if B.slot[s, SLOT_FORM] == IS_GENERIC:
-                update_axes(G, M, B, s, i, B.slot[s, SLOT_MOVER])
+                B.now[s, c], B.envelope[s, c] = B.raw_now[i, c], B.raw_envelope[i, c]
+            if B.slot.form[s] == IS_GENERIC:
+                update_axes(G, M, B, s, i, B.slot.mover[s])
                 store_axes(B, s)
-    for s in range(B.count[BOUNDED]):
-        B.key[s], _ = cell_of_slot(B, s, B.slot[s, SLOT_LEVEL])
+    for s in range(B.count.bounded):
+        B.key[s], _ = cell_of_slot(B, s, B.slot.level[s])
         B.mark[s] = 0
 
 
@@ -265,9 +238,9 @@ def fill_slots(G, M, B):
 def sort_shapes(G, M, B):
     """Assign new slots and envelopes to all bounded shapes; restarts the frame."""
     for c in range(3):
-        B.real[FRAME_ORIGIN + c] = B.real[FRAME_LAG + c] = 0.0
-        B.real[FRAME_STEP + c] = B.real[AHEAD] * B.real[FRAME_VELOCITY + c]
+        B.frame.origin[c] = B.frame.lag[c] = 0.0
+        B.frame.step[c] = B.real.ahead * B.frame.velocity[c]
     make_envelopes(G, M, B)
     number_slots(B, lay_out_levels(B))
     fill_slots(G, M, B)
-    B.count[ENVELOPES_RENEWED] += B.count[BOUNDED]
+    B.count.envelopes_renewed += B.count.bounded

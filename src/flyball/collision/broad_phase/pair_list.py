@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...compiler.formulas import formula
+from ...math.vec import load3
 from ..contact_matching import store_pair, stored_contact
-from ..tables import MASK, MEMBER
 from .cell_grid import (
     bucket_of_cell,
     cell_index,
@@ -17,34 +17,13 @@ from .cell_grid import (
 )
 from .envelopes import bounds_meet, envelope_reaches_plane, store_axes, store_reference_plane, write_envelope
 from .workspace import (
-    BOUNDED,
-    CELL_EDGE,
-    CLASSES_EXACT,
-    CURRENT_HALF,
-    ENVELOPE_BOUND,
-    ENVELOPE_RADIUS,
-    ENVELOPES_RENEWED,
     GENERIC_PAIR,
     IS_GENERIC,
     IS_PLANE,
     IS_SPHERE,
-    LEVEL_CLASS,
-    LEVELS,
-    MIDDLE,
-    MOVED_SLOTS,
-    PAIRS_COMPARED,
-    PAIRS_IN_LIST,
     PLANE_SPHERE,
-    RAW_ENVELOPE,
-    SLOT_CLASS,
-    SLOT_FORM,
-    SLOT_LEVEL,
-    SLOT_MOVER,
-    SLOT_SHAPE,
     SPHERE_PLANE,
-    SPHERE_RADIUS,
     SPHERE_SPHERE,
-    WIDE,
 )
 
 LONG_ENVELOPE = 0.5  # envelopes longer than this, relative to the radius, are tested as capsules
@@ -68,12 +47,12 @@ def is_excluded(excluded, a, b):
 @formula
 def may_touch(G, B, s, t):
     """Whether the shapes of two slots may collide at all."""
-    a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
+    a, b = B.slot.mover[s], B.slot.mover[t]
     if a == b:  # the same mover, or both fixed
         return False
-    if B.count[CLASSES_EXACT] == 0:
-        i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
-        if G.shape_i[i, MEMBER] & G.shape_i[j, MASK] == 0 or G.shape_i[j, MEMBER] & G.shape_i[i, MASK] == 0:
+    if B.count.classes_exact == 0:
+        i, j = B.slot.shape_index[s], B.slot.shape_index[t]
+        if G.shape.member[i] & G.shape.mask[j] == 0 or G.shape.member[j] & G.shape.mask[i] == 0:
             return False
     return G.apart.shape[0] == 0 or not is_excluded(G.apart, a, b)
 
@@ -84,7 +63,7 @@ def squared_axis_distance(fat, s, t, x, y, z):
 
     The parameters are found alternately, as for two segments (Ericson 2005, 5.1.9).
     """
-    a, b = (fat[s, 3], fat[s, 4], fat[s, 5]), (fat[t, 3], fat[t, 4], fat[t, 5])
+    a, b = load3(fat.half_line, s, 0), load3(fat.half_line, t, 0)
     aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
     ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -110,16 +89,16 @@ def squared_axis_distance(fat, s, t, x, y, z):
 def envelopes_meet(B, s, t):
     """Whether the envelopes of two bounded slots overlap."""
     fat = B.envelope
-    x = fat[t, MIDDLE] - fat[s, MIDDLE]
-    y = fat[t, MIDDLE + 1] - fat[s, MIDDLE + 1]
-    z = fat[t, MIDDLE + 2] - fat[s, MIDDLE + 2]
-    whole = fat[s, ENVELOPE_BOUND] + fat[t, ENVELOPE_BOUND]
+    x = fat.middle[t, 0] - fat.middle[s, 0]
+    y = fat.middle[t, 1] - fat.middle[s, 1]
+    z = fat.middle[t, 2] - fat.middle[s, 2]
+    whole = fat.bound[s] + fat.bound[t]
     if x * x + y * y + z * z > whole * whole:
         return False
-    close = fat[s, ENVELOPE_RADIUS] + fat[t, ENVELOPE_RADIUS]
+    close = fat.radius[s] + fat.radius[t]
     if whole > (1.0 + LONG_ENVELOPE) * close and squared_axis_distance(fat, s, t, x, y, z) > close * close:
         return False
-    return bounds_meet(B, B.turn, s, t, (x, y, z), whole - B.now[s, SPHERE_RADIUS] - B.now[t, SPHERE_RADIUS])
+    return bounds_meet(B, B.turn, s, t, (x, y, z), whole - B.now.radius[s] - B.now.radius[t])
 
 
 SUCCEEDING_SLOTS, ALL_SLOTS, UNVISITED_SLOTS = range(3)
@@ -129,21 +108,21 @@ SUCCEEDING_SLOTS, ALL_SLOTS, UNVISITED_SLOTS = range(3)
 @formula
 def add_pair(G, B, s, t):
     """Add two slots to the list; returns whether the table was large enough."""
-    n = B.count[PAIRS_IN_LIST]
+    n = B.count.pairs
     if n >= B.pair.shape[0]:
         return False
-    i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
+    i, j = B.slot.shape_index[s], B.slot.shape_index[t]
     if i > j:
         i, j, s, t = j, i, t, s
-    a, b = B.slot[s, SLOT_FORM], B.slot[t, SLOT_FORM]
+    a, b = B.slot.form[s], B.slot.form[t]
     way = GENERIC_PAIR
     if b == IS_SPHERE and (a == IS_SPHERE or a == IS_PLANE):
         way = SPHERE_SPHERE if a == IS_SPHERE else PLANE_SPHERE
     elif a == IS_SPHERE and b == IS_PLANE:
         way = SPHERE_PLANE
-    B.pair[n, 0], B.pair[n, 1], B.pair[n, 2] = s, t, way
-    B.seen[B.count[CURRENT_HALF], n] = stored_contact(B, i, j)
-    B.count[PAIRS_IN_LIST] = n + 1
+    B.pair.first[n], B.pair.second[n], B.pair.kind[n] = s, t, way
+    B.seen[B.count.current_half, n] = stored_contact(B, i, j)
+    B.count.pairs = n + 1
     return True
 
 
@@ -157,16 +136,16 @@ def add_from_cell(G, B, s, t, key, which):
             if envelopes_meet(B, s, t) and may_touch(G, B, s, t) and not add_pair(G, B, s, t):
                 return False
         t = B.link[t]
-    B.count[PAIRS_COMPARED] += compared
+    B.count.pairs_compared += compared
     return True
 
 
 @formula
 def add_from_level(G, B, s, l, which):
     """Add partners from level l, by testing every slot."""
-    for t in range(B.count[BOUNDED]):
-        if B.slot[t, SLOT_LEVEL] == l and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
-            B.count[PAIRS_COMPARED] += 1
+    for t in range(B.count.bounded):
+        if B.slot.level[t] == l and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
+            B.count.pairs_compared += 1
             if envelopes_meet(B, s, t) and may_touch(G, B, s, t) and not add_pair(G, B, s, t):
                 return False
     return True
@@ -182,9 +161,9 @@ def add_neighbours(G, B, s, l, which):
     own = (a, b, c)
     if which == SUCCEEDING_SLOTS:
         own = (
-            cell_index(B, l, 0, B.envelope[s, MIDDLE]),
-            cell_index(B, l, 1, B.envelope[s, MIDDLE + 1]),
-            cell_index(B, l, 2, B.envelope[s, MIDDLE + 2]),
+            cell_index(B, l, 0, B.envelope.middle[s, 0]),
+            cell_index(B, l, 1, B.envelope.middle[s, 1]),
+            cell_index(B, l, 2, B.envelope.middle[s, 2]),
         )
         if not add_from_cell(G, B, s, B.link[s], B.key[s], SUCCEEDING_SLOTS):
             return False
@@ -202,10 +181,10 @@ def add_neighbours(G, B, s, l, which):
 @formula
 def add_plane_pairs(G, B, w):
     """Add the partners of a wide slot; returns whether the table was large enough."""
-    of = B.slot[w, SLOT_CLASS]
-    store_reference_plane(B, w - B.count[BOUNDED], B.slot[w, SLOT_MOVER] < 0)
-    for s in range(B.count[BOUNDED]):
-        near = B.meets[of, B.slot[s, SLOT_CLASS]] != 0 and envelope_reaches_plane(B, w - B.count[BOUNDED], s)
+    of = B.slot.collision_class[w]
+    store_reference_plane(B, w - B.count.bounded, B.slot.mover[w] < 0)
+    for s in range(B.count.bounded):
+        near = B.meets[of, B.slot.collision_class[s]] != 0 and envelope_reaches_plane(B, w - B.count.bounded, s)
         if near and may_touch(G, B, s, w) and not add_pair(G, B, s, w):
             return False
     return True
@@ -214,16 +193,16 @@ def add_plane_pairs(G, B, w):
 @formula
 def list_all(G, B):
     """List all pairs, in the order of the slots; returns whether the table was large enough."""
-    B.count[PAIRS_IN_LIST] = 0
-    for s in range(B.count[BOUNDED]):
-        own = B.slot[s, SLOT_LEVEL]
-        edge = B.level_x[own, CELL_EDGE]
-        for l in range(B.count[LEVELS]):
-            if B.meets[B.slot[s, SLOT_CLASS], B.level_i[l, LEVEL_CLASS]] != 0:
-                coarser = B.level_x[l, CELL_EDGE] > edge or (B.level_x[l, CELL_EDGE] == edge and l >= own)
+    B.count.pairs = 0
+    for s in range(B.count.bounded):
+        own = B.slot.level[s]
+        edge = B.level_grid.edge[own]
+        for l in range(B.count.levels):
+            if B.meets[B.slot.collision_class[s], B.level_cells.collision_class[l]] != 0:
+                coarser = B.level_grid.edge[l] > edge or (B.level_grid.edge[l] == edge and l >= own)
                 if coarser and not add_neighbours(G, B, s, l, SUCCEEDING_SLOTS if l == own else ALL_SLOTS):
                     return False
-    for w in range(B.count[BOUNDED], B.count[BOUNDED] + B.count[WIDE]):  # noqa: SIM110
+    for w in range(B.count.bounded, B.count.bounded + B.count.wide):  # noqa: SIM110
         if not add_plane_pairs(G, B, w):
             return False
     return True
@@ -232,55 +211,55 @@ def list_all(G, B):
 @formula
 def drop_moved(B):
     """Remove pairs of marked slots from the list, and store their contacts in the hash table."""
-    n, half = 0, B.count[CURRENT_HALF]
-    for k in range(B.count[PAIRS_IN_LIST]):
-        s, t, first = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.seen[half, k] + 0  # all integers of one type
+    n, half = 0, B.count.current_half
+    for k in range(B.count.pairs):
+        s, t, first = B.pair.first[k] + 0, B.pair.second[k] + 0, B.seen[half, k] + 0  # all integers of one type
         if B.mark[s] == 0 and B.mark[t] == 0:
             if n < k:
-                B.pair[n, 0], B.pair[n, 1], B.pair[n, 2], B.seen[half, n] = s, t, B.pair[k, 2], first
+                B.pair.first[n], B.pair.second[n], B.pair.kind[n], B.seen[half, n] = s, t, B.pair.kind[k], first
             n += 1
         elif first >= 0:
-            store_pair(B, B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE], first)
-    B.count[PAIRS_IN_LIST] = n
+            store_pair(B, B.slot.shape_index[s], B.slot.shape_index[t], first)
+    B.count.pairs = n
 
 
 @formula
 def renew_envelope(B, s):
     """Compute a new envelope of slot s and insert it into its cell; returns whether a level fits."""
-    i = B.slot[s, SLOT_SHAPE]
+    i = B.slot.shape_index[s]
     for c in range(8):
-        B.raw[i, c] = B.now[s, c]
-    write_envelope(B, B.raw, i, RAW_ENVELOPE, B.slot[s, SLOT_MOVER] < 0)
-    l = finest_level(B, B.slot[s, SLOT_CLASS], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+        B.raw_now[i, c] = B.now[s, c]
+    write_envelope(B, B.raw_now, B.raw_envelope, i, B.slot.mover[s] < 0)
+    l = finest_level(B, B.slot.collision_class[s], B.raw_envelope.bound[i])
     if l < 0:
         return False
     remove_from_cell(B, s)
     for c in range(8):
-        B.envelope[s, c] = B.raw[i, RAW_ENVELOPE + c]
-    if B.slot[s, SLOT_FORM] == IS_GENERIC:
+        B.envelope[s, c] = B.raw_envelope[i, c]
+    if B.slot.form[s] == IS_GENERIC:
         store_axes(B, s)
     insert_into_cell(B, s, l)
-    B.count[ENVELOPES_RENEWED] += 1
+    B.count.envelopes_renewed += 1
     return True
 
 
 @formula
 def list_moved(G, B):
     """Append the pairs of shapes that have left their envelopes; returns whether the table was large enough."""
-    wide = B.count[BOUNDED]
-    for k in range(B.count[MOVED_SLOTS]):
+    wide = B.count.bounded
+    for k in range(B.count.moved_slots):
         s = B.moved[k]
         if s >= wide:
             if not add_plane_pairs(G, B, s):
                 return False
             continue
-        for l in range(B.count[LEVELS]):
-            if B.meets[B.slot[s, SLOT_CLASS], B.level_i[l, LEVEL_CLASS]] != 0 and not add_neighbours(
+        for l in range(B.count.levels):
+            if B.meets[B.slot.collision_class[s], B.level_cells.collision_class[l]] != 0 and not add_neighbours(
                 G, B, s, l, UNVISITED_SLOTS
             ):
                 return False
-        for w in range(wide, wide + B.count[WIDE]):
-            may = B.mark[w] == 0 and B.meets[B.slot[w, SLOT_CLASS], B.slot[s, SLOT_CLASS]] != 0
+        for w in range(wide, wide + B.count.wide):
+            may = B.mark[w] == 0 and B.meets[B.slot.collision_class[w], B.slot.collision_class[s]] != 0
             if may and envelope_reaches_plane(B, w - wide, s) and may_touch(G, B, s, w) and not add_pair(G, B, s, w):
                 return False
     return True

@@ -13,9 +13,9 @@ from math import inf
 from ...compiler.formulas import formula, generated_formula
 from ...compiler.kernels import Kernel, kernel
 from ...math.vec import add, dot, load3, load9, mm, mv, sub
-from ..broad_phase.workspace import QUERY_REACH, QUERY_SHAPE_1, QUERY_SHAPE_2, Search
+from ..broad_phase.workspace import Search
 from ..shape_kinds import FIELD, PLANAR
-from ..tables import AXES, KIND, MOVER, PLACE, Geometry, Movers
+from ..tables import Geometry, Movers
 from .distance import generic_pair
 from .special_pairs.registry import PAIR_FORMULAS
 
@@ -41,8 +41,8 @@ _by_kinds_planar = _by_kinds("by_kinds_planar", PLANAR, "0")
 @formula
 def shape_pose(G, M, i):
     """Origin of a shape, and its axes (rows convert its components to the world's)."""
-    m = G.shape_i[i, MOVER]
-    p, R = load3(G.shape_x, i, PLACE), load9(G.shape_x, i, AXES)
+    m = G.shape.mover[i]
+    p, R = load3(G.dimensions.place, i, 0), load9(G.dimensions.axes, i, 0)
     if m < 0:
         return p, R
     Q = load9(M.pose, m, 3)
@@ -52,7 +52,7 @@ def shape_pose(G, M, i):
 @formula
 def _collide_by(by_kinds, G, M, i, j, reach, scratch):
     """Find contacts of two shapes with a formula that selects by kind."""
-    a, b = G.shape_i[i, KIND], G.shape_i[j, KIND]
+    a, b = G.shape.kind[i], G.shape.kind[j]
     turned = a > b
     if turned:
         i, j, a, b = j, i, b, a
@@ -106,19 +106,19 @@ def collide_convex(G, M, i, j, reach, scratch):
 @kernel
 def between(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of shapes of any kind."""
-    return collide(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+    return collide(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
 
 
 @kernel
 def between_convex(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of convex shapes."""
-    return collide_convex(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+    return collide_convex(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
 
 
 @kernel
 def between_planar(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of shapes of planar mechanisms."""
-    return collide_planar(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+    return collide_planar(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
 
 
 @kernel

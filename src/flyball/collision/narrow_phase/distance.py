@@ -16,7 +16,6 @@ from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, mm, mtv, mv, neg, norm, scale, store3, sub, transpose
 from ..shapes.polygon import support
 from ..shapes.registry import radius
-from ..tables import COUNT, FIRST, KIND
 from .epa import POLYTOPE_ROWS as POLYTOPE
 from .epa import penetration_depth
 from .gjk import BEYOND_REACH, OVERLAPPING, SEPARATE, core_distance, difference_support, point_of_simplex
@@ -37,7 +36,7 @@ def edge_normal(G, a, b):
 @formula
 def point_polygon_distance(G, i, c):
     """Signed distance of a point from a polygon's core, unit vector from the core to it, nearest point of the core."""
-    first, count = G.shape_i[i, FIRST], G.shape_i[i, COUNT]
+    first, count = G.shape.first[i], G.shape.count[i]
     x, y, least = G.vertex[first, 0], G.vertex[first, 1], inf
     depth, n = -inf, (1.0, 0.0, 0.0)
     a = first + count - 1
@@ -67,7 +66,7 @@ def point_polygon_distance(G, i, c):
 @formula
 def edge_separation(G, i, j, p, R):
     """Largest separation along a side's normal of polygon i, and that normal; j has pose (p, R) in i's axes."""
-    first, count = G.shape_i[i, FIRST], G.shape_i[i, COUNT]
+    first, count = G.shape.first[i], G.shape.count[i]
     far, n, a = -inf, (1.0, 0.0, 0.0), first + count - 1
     for b in range(first, first + count):
         m, length = edge_normal(G, a, b)
@@ -83,9 +82,9 @@ def edge_separation(G, i, j, p, R):
 @formula
 def nearest_vertex(G, i, j, p, R):
     """Distance of the corner of polygon j nearest to polygon i, unit vector to it, both nearest points."""
-    first = G.shape_i[j, FIRST]
+    first = G.shape.first[j]
     far, n, x, y = inf, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(first, first + G.shape_i[j, COUNT]):
+    for k in range(first, first + G.shape.count[j]):
         c = add(p, mv(R, load3(G.vertex, k, 0)))
         length, d, q = point_polygon_distance(G, i, c)
         if length < far:
@@ -201,7 +200,7 @@ def core_separation(G, i, j, p, R, start, far, scratch, at):
 @formula
 def signed_distance(G, i, j, A, B, reach, scratch):
     """Signed gap, unit normal from i to j, point midway between the surfaces; above ``reach`` some gap above it."""
-    r, s = radius(G.shape_i[i, KIND], G, i), radius(G.shape_i[j, KIND], G, j)
+    r, s = radius(G.shape.kind[i], G, i), radius(G.shape.kind[j], G, j)
     p = mtv(A[1], sub(B[0], A[0]))
     start = p if dot(p, p) > 0.0 else (1.0, 0.0, 0.0)
     far, d, a = core_separation(G, i, j, p, mm(transpose(A[1]), B[1]), start, reach + r + s, scratch, SIMPLEX)

@@ -17,14 +17,13 @@ from ...math.scalar import sqrt
 from ...math.vec import add, cross, dot, load3, mtv, mv, neg, scale, store3, sub
 from ..shape_kinds import FIELD
 from ..shapes.registry import support
-from ..tables import KIND
 from .primitives import FIELD_TRIANGLE
 
 
 @formula
 def core_support(G, i, scratch, d):
     """Point of the core of shape i farthest along d, in its axes."""
-    kind = G.shape_i[i, KIND]
+    kind = G.shape.kind[i]
     if kind != FIELD:
         return support(kind, G, i, d)
     best = load3(scratch, FIELD_TRIANGLE, 0)

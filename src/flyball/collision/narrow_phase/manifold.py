@@ -18,7 +18,6 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, axes_across, dot, mtv, neg, scale, store3
 from ..shapes.registry import face, radius
-from ..tables import KIND, RADIUS
 from .primitives import CLIPPED_1, CLIPPED_2, FACE_1, FACE_2, MAX_CORNERS
 
 X, Y, Z, EDGE, DEPTH = range(5)  # columns: position, height, edge to the next corner, gap
@@ -158,7 +157,7 @@ def contact_frame(n):
 def face_in_frame(G, i, P, d, frame, scratch, at):
     """Write the face of shape i at P that faces d in the frame; returns the number of corners, and its number."""
     p, R = P
-    count, number = face(G.shape_i[i, KIND], G, i, mtv(R, d), scratch, at)
+    count, number = face(G.shape.kind[i], G, i, mtv(R, d), scratch, at)
     u, v, n = mtv(R, frame[0]), mtv(R, frame[1]), mtv(R, frame[2])
     x, y, z = dot(frame[0], p), dot(frame[1], p), dot(frame[2], p)
     for k in range(at, at + count):
@@ -294,8 +293,8 @@ def manifold(G, i, j, A, B, n, nearest, reach, scratch):
     m2 = number_2 = 0
     if m1 > 1:
         m2, number_2 = face_in_frame(G, j, B, neg(n), frame, scratch, FACE_2)
-    r1, r2 = radius(G.shape_i[i, KIND], G, i), radius(G.shape_i[j, KIND], G, j)
-    same = SAME_POINT * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
+    r1, r2 = radius(G.shape.kind[i], G, i), radius(G.shape.kind[j], G, j)
+    same = SAME_POINT * min(G.dimensions.radius[i], G.dimensions.radius[j])
     at, count, least = CLIPPED_1, 0, inf
     if m2 > 1:
         at, count, other, a, b, side = face_overlap(scratch, m1, m2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...math.vec import store3
 from ..shape_kinds import CAPSULE
-from ..tables import PAR
 
 KIND = CAPSULE
 
@@ -13,14 +12,14 @@ KIND = CAPSULE
 @formula
 def support(G, i, d):
     """Return the upper or lower end of the segment."""
-    h = G.shape_x[i, PAR + 1]
+    h = G.dimensions.par[i, 1]
     return (0.0, 0.0, h if d[2] >= 0 else -h)
 
 
 @formula
 def face(G, i, d, scratch, at):
     """Write the segment."""
-    h = G.shape_x[i, PAR + 1]
+    h = G.dimensions.par[i, 1]
     store3(scratch, at, 0, (0.0, 0.0, -h))
     store3(scratch, at + 1, 0, (0.0, 0.0, h))
     return 2, 0
@@ -29,4 +28,4 @@ def face(G, i, d, scratch, at):
 @formula
 def radius(G, i):
     """Radius about the segment."""
-    return G.shape_x[i, PAR]
+    return G.dimensions.par[i, 0]

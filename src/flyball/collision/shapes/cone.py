@@ -7,7 +7,6 @@ from ...math.scalar import sqrt
 from ...math.vec import store3
 from ..narrow_phase.primitives import disc_corners, lateral_direction
 from ..shape_kinds import CONE
-from ..tables import PAR
 
 KIND = CONE
 
@@ -15,7 +14,7 @@ KIND = CONE
 @formula
 def support(G, i, d):
     """Return the tip or a point of the rim."""
-    r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    r, h = G.dimensions.par[i, 0], G.dimensions.par[i, 1]
     (x, y), s = lateral_direction(d)
     if h * d[2] > r * s:
         return (0.0, 0.0, h)
@@ -25,7 +24,7 @@ def support(G, i, d):
 @formula
 def face(G, i, d, scratch, at):
     """Write a line of the lateral surface, or the base as a polygon."""
-    r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    r, h = G.dimensions.par[i, 0], G.dimensions.par[i, 1]
     (x, y), s = lateral_direction(d)
     if h * s + r * d[2] > -d[2] * sqrt(h * h + r * r):
         store3(scratch, at, 0, (r * x, r * y, 0.0))

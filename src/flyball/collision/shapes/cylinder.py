@@ -6,7 +6,6 @@ from ...compiler.formulas import formula
 from ...math.vec import store3
 from ..narrow_phase.primitives import disc_corners, lateral_direction
 from ..shape_kinds import CYLINDER
-from ..tables import PAR
 
 KIND = CYLINDER
 
@@ -14,7 +13,7 @@ KIND = CYLINDER
 @formula
 def support(G, i, d):
     """Return a point of one of the rims."""
-    r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    r, h = G.dimensions.par[i, 0], G.dimensions.par[i, 1]
     (x, y), _ = lateral_direction(d)
     return (r * x, r * y, h if d[2] >= 0 else -h)
 
@@ -22,7 +21,7 @@ def support(G, i, d):
 @formula
 def face(G, i, d, scratch, at):
     """Write a line of the lateral surface, or one of the discs as a polygon."""
-    r, h = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    r, h = G.dimensions.par[i, 0], G.dimensions.par[i, 1]
     (x, y), s = lateral_direction(d)
     if s > abs(d[2]):
         store3(scratch, at, 0, (r * x, r * y, -h))

@@ -1,7 +1,7 @@
 """A height field: heights over a grid, two triangles per cell, solid below. It is fixed.
 
 Parameters: number of heights along x and along y, and the width of a cell along x and along y; the first height
-is over the origin, height (i, j) over (i dx, j dy). Heights are in `Geometry.vertex` from row ``FIRST`` on, three
+is over the origin, height (i, j) over (i dx, j dy). Heights are in `Geometry.vertex` from row ``first`` on, three
 per row, those with the same i consecutively. The diagonal of a cell goes from (i, j) to (i + 1, j + 1).
 
 A shape is tested against one triangle at a time, the current triangle. It is in the scratch at `FIELD_TRIANGLE`, its
@@ -19,7 +19,6 @@ from ...errors import ModelError
 from ...math.vec import cross, dot, load3, store3, sub
 from ..narrow_phase.primitives import FIELD_TRIANGLE, MAX_CONTACTS
 from ..shape_kinds import FIELD
-from ..tables import FIRST, PAR
 
 KIND = FIELD
 FEATURE_PERIOD = 65536.0  # numbers of triangles are taken modulo this number
@@ -28,15 +27,15 @@ FEATURE_PERIOD = 65536.0  # numbers of triangles are taken modulo this number
 @formula
 def grid(G, i):
     """Numbers of heights along x and y, widths of a cell."""
-    return int(G.shape_x[i, PAR]), int(G.shape_x[i, PAR + 1]), G.shape_x[i, PAR + 2], G.shape_x[i, PAR + 3]
+    return int(G.dimensions.par[i, 0]), int(G.dimensions.par[i, 1]), G.dimensions.par[i, 2], G.dimensions.par[i, 3]
 
 
 @formula
 def grid_point(G, f, i, j):
     """Return the point of the surface over grid point (i, j)."""
-    k = i * int(G.shape_x[f, PAR + 1]) + j
-    z = G.vertex[G.shape_i[f, FIRST] + k // 3, k % 3]
-    return (i * G.shape_x[f, PAR + 2], j * G.shape_x[f, PAR + 3], z)
+    k = i * int(G.dimensions.par[f, 1]) + j
+    z = G.vertex[G.shape.first[f] + k // 3, k % 3]
+    return (i * G.dimensions.par[f, 2], j * G.dimensions.par[f, 3], z)
 
 
 @formula

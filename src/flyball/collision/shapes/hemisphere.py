@@ -7,7 +7,6 @@ from ...math.scalar import sqrt
 from ...math.vec import dot, scale
 from ..narrow_phase.primitives import disc_corners, lateral_direction
 from ..shape_kinds import HEMISPHERE
-from ..tables import PAR
 
 KIND = HEMISPHERE
 
@@ -15,7 +14,7 @@ KIND = HEMISPHERE
 @formula
 def support(G, i, d):
     """Return a point of the dome or of the rim."""
-    r = G.shape_x[i, PAR]
+    r = G.dimensions.par[i, 0]
     if d[2] > 0.0:
         return scale(r / sqrt(dot(d, d)), d)
     (x, y), s = lateral_direction(d)
@@ -27,4 +26,4 @@ def face(G, i, d, scratch, at):
     """Write the flat side as a polygon, if d points down by more than 45 degrees; otherwise no flat part."""
     if d[2] * d[2] < 0.5 or d[2] > 0.0:
         return 0, 1
-    return disc_corners(G.shape_x[i, PAR], 0.0, -1.0, d, scratch, at), 0
+    return disc_corners(G.dimensions.par[i, 0], 0.0, -1.0, d, scratch, at), 0

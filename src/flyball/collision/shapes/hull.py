@@ -1,7 +1,7 @@
 """A convex polyhedron, written into the tables by `convex_decomposition.Hull`.
 
-Vertices are in `Geometry.vertex` from row ``FIRST`` on, followed by the outward unit normals of its faces, one per
-row. Faces are in `Geometry.face` from ``FACE_FIRST`` on; corners are numbered from the hull's first vertex.
+Vertices are in `Geometry.vertex` from row ``first`` on, followed by the outward unit normals of its faces, one per
+row. Faces are in `Geometry.face` from ``face_first`` on; corners are numbered from the hull's first vertex.
 Parameters: rounding radius, and the first place of its edges in `Geometry.face`, -1 if it is too small to need them:
 the numbers of six start vertices (smallest and largest x, y, z), the place of each vertex's neighbours, counted from
 there, and the neighbours, each list closed by -1.
@@ -14,17 +14,15 @@ from ...math.scalar import absolute
 from ...math.vec import dot, load3, store3, sub
 from ..narrow_phase.primitives import MAX_CORNERS
 from ..shape_kinds import HULL
-from ..tables import COUNT, FACE_COUNT, FACE_FIRST, FIRST, PAR
 
 KIND = HULL
-EDGE_LISTS = PAR + 1
 IN_PLANE = 1e-7  # relative to the distance; largest offset of a vertex from the plane of its face
 
 
 @formula
 def radius(G, i):
     """Return the rounding radius."""
-    return G.shape_x[i, PAR]
+    return G.dimensions.par[i, 0]
 
 
 @formula
@@ -49,12 +47,12 @@ def climb_edges(G, first, at, d):
 @formula
 def farthest_vertex(G, i, d):
     """Row of the vertex farthest along d."""
-    first = G.shape_i[i, FIRST]
-    at = int(G.shape_x[i, EDGE_LISTS])
+    first = G.shape.first[i]
+    at = int(G.dimensions.par[i, 1])
     if at >= 0:
         return first + climb_edges(G, first, at, d)
     here, best = first, dot(d, load3(G.vertex, first, 0))
-    for k in range(first + 1, first + G.shape_i[i, COUNT]):
+    for k in range(first + 1, first + G.shape.count[i]):
         value = dot(d, load3(G.vertex, k, 0))
         if value > best:
             best, here = value, k
@@ -70,10 +68,10 @@ def support(G, i, d):
 @formula
 def facing_side(G, i, d, top):
     """Return the number and place of the face that faces d best, among those with the vertex ``top``."""
-    first, normals = G.shape_i[i, FIRST], G.shape_i[i, FIRST] + G.shape_i[i, COUNT]
-    at = G.shape_i[i, FACE_FIRST]
+    first, normals = G.shape.first[i], G.shape.first[i] + G.shape.count[i]
+    at = G.shape.face_first[i]
     number, place, best = 0, at, -2.0
-    for f in range(G.shape_i[i, FACE_COUNT]):
+    for f in range(G.shape.face_count[i]):
         n = load3(G.vertex, normals + f, 0)
         if dot(n, d) > best:
             off = sub(top, load3(G.vertex, first + G.face[at + 1], 0))
@@ -87,7 +85,7 @@ def facing_side(G, i, d, top):
 def face(G, i, d, scratch, at):
     """Write the side that faces d best; of too many corners only `MAX_CORNERS`, including the farthest vertex."""
     top = farthest_vertex(G, i, d)
-    first = G.shape_i[i, FIRST]
+    first = G.shape.first[i]
     number, place = facing_side(G, i, d, load3(G.vertex, top, 0))
     corners = G.face[place]
     begin = 0

@@ -6,7 +6,6 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import load3, store3
 from ..shape_kinds import POLYGON
-from ..tables import COUNT, FIRST, PAR
 
 KIND = POLYGON
 
@@ -14,9 +13,9 @@ KIND = POLYGON
 @formula
 def support(G, i, d):
     """Return the farthest corner."""
-    first = best = G.shape_i[i, FIRST]
+    first = best = G.shape.first[i]
     far = G.vertex[best, 0] * d[0] + G.vertex[best, 1] * d[1]
-    for k in range(first + 1, first + G.shape_i[i, COUNT]):
+    for k in range(first + 1, first + G.shape.count[i]):
         s = G.vertex[k, 0] * d[0] + G.vertex[k, 1] * d[1]
         if s > far:
             best, far = k, s
@@ -26,7 +25,7 @@ def support(G, i, d):
 @formula
 def facing_edge(G, i, d):
     """Edge whose outward normal is nearest to d: first corner, second corner (rows of the vertices)."""
-    first, count = G.shape_i[i, FIRST], G.shape_i[i, COUNT]
+    first, count = G.shape.first[i], G.shape.count[i]
     best, far, a = first, -2.0, first + count - 1
     for b in range(first, first + count):
         x, y = G.vertex[b, 0] - G.vertex[a, 0], G.vertex[b, 1] - G.vertex[a, 1]
@@ -46,10 +45,10 @@ def face(G, i, d, scratch, at):
     if a == b:
         return 1, 0
     store3(scratch, at + 1, 0, load3(G.vertex, b, 0))
-    return 2, a - G.shape_i[i, FIRST]
+    return 2, a - G.shape.first[i]
 
 
 @formula
 def radius(G, i):
     """Return the rounding radius."""
-    return G.shape_x[i, PAR]
+    return G.dimensions.par[i, 0]

@@ -11,7 +11,6 @@ from ...compiler.formulas import formula, formula_at
 from ...compiler.kernels import Signature
 from ...math.vec import scale
 from ..shape_kinds import SOLID
-from ..tables import PAR
 
 KIND = SOLID
 SUPPORT_SIGNATURES = (Signature("support", "par, d", (7, 3), 3, "a point: a tuple of three numbers"),)
@@ -21,6 +20,6 @@ SUPPORT_SIGNATURES = (Signature("support", "par, d", (7, 3), 3, "a point: a tupl
 @formula
 def support(G, i, d):
     """Evaluate the user's formula."""
-    k, x = PAR, G.shape_x
-    par = (x[i, k], x[i, k + 1], x[i, k + 2], x[i, k + 3], x[i, k + 4], x[i, k + 5], x[i, k + 6])
-    return scale(x[i, k + 7], formula_at(G.code[i], 0, (par, d), (nan, nan, nan)))
+    x = G.dimensions.par
+    par = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4], x[i, 5], x[i, 6])
+    return scale(x[i, 7], formula_at(G.code[i], 0, (par, d), (nan, nan, nan)))

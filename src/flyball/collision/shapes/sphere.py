@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from ..shape_kinds import SPHERE
-from ..tables import PAR
 
 KIND = SPHERE
 
@@ -18,4 +17,4 @@ def support(G, i, d):
 @formula
 def radius(G, i):
     """Radius; the core is a point."""
-    return G.shape_x[i, PAR]
+    return G.dimensions.par[i, 0]

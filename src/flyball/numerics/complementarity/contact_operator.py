@@ -20,16 +20,7 @@ from ...math.vec import add, cross, dot, load3, load9, mtv, mv, neg, scale, stor
 from .cone_projection import least_normal_impulse, project_on_cone_above, project_on_rolling_cone
 from .contact_problem import (
     FIXED_SIDE,
-    HISTORY_FORCE,
-    HISTORY_ITERATION,
-    HISTORY_OBJECTIVE,
-    HISTORY_VELOCITY,
-    INVERSE_INERTIA,
     LIMIT_REACHED,
-    LINE_BIAS,
-    LINE_HIGH,
-    LINE_LOW,
-    LINE_SOFT,
     SOLVE_FAILED,
 )
 
@@ -114,7 +105,7 @@ def set_symmetric_block(A, i, o, a):
 @formula
 def angular_response(P, i, t):
     """Change of the angular velocity of node i by an angular impulse."""
-    return symmetric(symmetric_block(P.node, i, INVERSE_INERTIA), t)
+    return symmetric(symmetric_block(P.node.inverse_inertia, i, 0), t)
 
 
 @formula
@@ -127,7 +118,7 @@ def apply_angular_impulse(P, v, i, t):
 def apply_to_node(P, v, c, side, f):
     """Change a node's velocities by an impulse at the contact."""
     i = P.at[c, side]
-    store3(v, i, 0, add(load3(v, i, 0), scale(P.node[i, 0], f)))
+    store3(v, i, 0, add(load3(v, i, 0), scale(P.node.inverse_mass[i], f)))
     apply_angular_impulse(P, v, i, cross(load3(P.arm, c, 3 * side), f))
 
 
@@ -192,7 +183,7 @@ def apply_line_impulse(P, wide, k, p):
 @formula
 def line_diagonal(P, k):
     """Velocity of line k for its own unit impulse, compliance included."""
-    g, e, u = P.line_at[k, 0], P.line_at[k, 1], P.line_x[k, LINE_SOFT]
+    g, e, u = P.line_at[k, 0], P.line_at[k, 1], P.line_law.soft[k]
     for s in range(P.group[g + 1] - P.group[g]):
         u += P.J[e + s] * P.Y[e + s]
     return u
@@ -251,7 +242,9 @@ def diagonal_block(P, c):
         i = P.at[c, side]
         if i >= 0:
             a = load3(P.arm, c, 3 * side)
-            D = add_blocks(D, node_block(P, i, P.node[i, 0], e, (cross(a, e[0]), cross(a, e[1]), cross(a, e[2]))))
+            D = add_blocks(
+                D, node_block(P, i, P.node.inverse_mass[i], e, (cross(a, e[0]), cross(a, e[1]), cross(a, e[2])))
+            )
         elif i < FIXED_SIDE and P.block[c, side] >= 0:
             D = add_blocks(D, group_block(P, c, side, 0))
     return D
@@ -410,9 +403,9 @@ def accumulate_line_residuals(P, X, O, wide, free_wide, sofar):
         p, d, e = X.line[k], line_velocity(P, wide, k), line_velocity(P, free_wide, k)
         s = line_diagonal(P, k)
         s = 1.0 / s if s > 0.0 else 0.0
-        q = p - s * (d + P.line_x[k, LINE_BIAS] + P.line_x[k, LINE_SOFT] * p)
-        q = min(max(q, P.line_x[k, LINE_LOW]), P.line_x[k, LINE_HIGH]) - p
-        linear, square = p * (e + P.line_x[k, LINE_BIAS]), p * (d - e + P.line_x[k, LINE_SOFT] * p)
+        q = p - s * (d + P.line_law.bias[k] + P.line_law.soft[k] * p)
+        q = min(max(q, P.line_law.lower[k]), P.line_law.upper[k]) - p
+        linear, square = p * (e + P.line_law.bias[k]), p * (d - e + P.line_law.soft[k] * p)
         sofar = accumulate_residual(sofar, (q * q, s, p * p, linear, square))
     return sofar
 
@@ -427,8 +420,8 @@ def finish_solve(P, X, W, O, residual, used, last):
     velocity, force, linear, square = residual
     row = O.count.written
     if not last and row < O.history.shape[0]:
-        O.history[row, HISTORY_ITERATION], O.history[row, HISTORY_VELOCITY] = used, velocity
-        O.history[row, HISTORY_FORCE], O.history[row, HISTORY_OBJECTIVE] = force, 0.5 * square + linear
+        O.history.iteration[row], O.history.velocity[row] = used, velocity
+        O.history.force[row], O.history.objective[row] = force, 0.5 * square + linear
         O.count.written = row + 1
     if not last:
         return

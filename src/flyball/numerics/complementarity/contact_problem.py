@@ -25,18 +25,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.kernels import Kernel
-from ...compiler.struct_layout import Float1, Float2, Float3, Int1, Int2, Record
+from ...compiler.struct_layout import Column, Float1, Float2, Float3, Int1, Int2, Record, Vector3, Vector6, Vector9
 
 FIXED_SIDE = -1  # in ContactProblem.at: an immovable side; n >= 0: node n; -2 - k: group k
-# columns of ContactProblem.node
-INVERSE_MASS, INVERSE_INERTIA, IS_ISOTROPIC = 0, 1, 7
-# columns of ContactProblem.line_x
-LINE_BIAS, LINE_SOFT, LINE_LOW, LINE_HIGH = range(4)
 CONVERGED, LIMIT_REACHED, STALLED, SOLVE_FAILED, STORAGE_TOO_SMALL = range(
     5
 )  # SettingCounts.ended; STORAGE_TOO_SMALL: enlarge `FactorStorage`, call again
-# columns of SolverSettings.history
-HISTORY_ITERATION, HISTORY_VELOCITY, HISTORY_FORCE, HISTORY_OBJECTIVE = range(4)
 
 
 class ContactProblem(NamedTuple):
@@ -51,13 +45,13 @@ class ContactProblem(NamedTuple):
     soft: Float1  # (nc,): compliance of the normal impulse [velocity per impulse], 0 for hard contact
     turn: Float2  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
     least: Float1  # (nc,) or (0,): smallest normal impulse (from restitution); 0 if there is none
-    node: Float2  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
+    node: Nodes
     group: Int1  # (ng + 1,): first velocity of each group in ContactState.wide
     block: Int2  # (nc, 2): first number of J and Y of a side that is in a group, or -1
     J: Float1
     Y: Float1
     line_at: Int2  # (nl, 2): group, first number of its J and Y (n numbers each)
-    line_x: Float2  # (nl, 4): bias, compliance, smallest, largest impulse
+    line_law: LineLaws
     island: Int1  # (ni + 1,): first contact of each island; one island by default
     member: Int1  # (nn,): nodes by island
     member_p: Int1  # (ni + 1,): first node of each island in ``member``
@@ -103,7 +97,83 @@ class SolverSettings(NamedTuple):
 
     count: SettingCounts  # type: ignore[assignment]
     real: SettingReals  # type: ignore[assignment]
-    history: Float2  # (rows, 4): iteration, velocity residual, force residual, objective
+    history: SolveHistory
+
+
+class SphereContacts(Record, kind="Float", rows=True):
+    """Contacts whose arms are along the normal."""
+
+    normal: Vector3
+    arm_1: Column
+    arm_2: Column
+    bias: Column
+    soft: Column
+    inverse_normal: Column  # inverse diagonal, along the normal
+    inverse_tangential: Column
+    mu: Column
+    ratio: Column  # of both diagonals
+    impulse: Column  # normal
+    tangent: Vector3  # tangential impulse, in world axes
+    least: Column  # normal impulse
+
+
+class FrictionlessContacts(Record, kind="Float", rows=True):
+    """Contacts of any nodes without friction."""
+
+    normal: Vector3
+    torque: Vector6  # of a unit impulse on both sides
+    spin: Vector6  # angular velocities that they cause
+    bias: Column
+    soft: Column
+    inverse: Column  # inverse diagonal
+    impulse: Column
+    least: Column
+
+
+class FrictionalContacts(Record, kind="Float", rows=True):
+    """Contacts with friction, and general ones."""
+
+    frame: Vector9
+    arm: Vector6  # of both sides
+    bias: Vector3
+    soft: Column
+    inverse_nn: Column  # from here to ``ratio``: `packed_contacts.local_step_sizes`
+    ns: Column
+    nt: Column
+    inverse_ss: Column
+    inverse_st: Column
+    inverse_tt: Column
+    sliding_step: Column
+    ratio: Column
+    mu: Column
+    impulse: Vector3
+    least: Column  # normal impulse
+
+
+class LineLaws(Record, kind="Float", rows=True):
+    """Laws of the lines."""
+
+    bias: Column
+    soft: Column  # compliance
+    lower: Column  # smallest impulse
+    upper: Column
+
+
+class SolveHistory(Record, kind="Float", rows=True):
+    """Course of a solve."""
+
+    iteration: Column
+    velocity: Column  # residual
+    force: Column  # residual
+    objective: Column
+
+
+class Nodes(Record, kind="Float", rows=True):
+    """Masses of the nodes."""
+
+    inverse_mass: Column
+    inverse_inertia: Vector6  # symmetric block xx yy zz xy xz yz in the world
+    isotropic: Column  # 1 if the block is a multiple of 1
 
 
 class ContactWorkspace(NamedTuple):
@@ -117,8 +187,10 @@ class ContactWorkspace(NamedTuple):
     inner: Float2  # (nn + 1, 8): inverse inertia block of each node, two unused
     free: Float2  # (nn + 1, 8): v, w without impulses, two unused
     free_wide: Float1  # velocities of the groups without impulses
-    packed: Float1  # (32 nc,): contacts in the order of sweeps, all numbers of each together
-    sides: Int2  # (nc, 3): in that order the two nodes in ``own`` and the number of the contact
+    sides: Int2  # (nc, 3): in the order of sweeps the two nodes in ``own`` and the number of the contact
+    spheres: SphereContacts  # (nc): contacts in that order, each in the table of its kind
+    frictionless: FrictionlessContacts  # (nc)
+    frictional: FrictionalContacts  # (nc): also those of groups
 
 
 class FactorStorage(NamedTuple):
@@ -126,9 +198,6 @@ class FactorStorage(NamedTuple):
 
     numbers: Float1
     places: Int1
-
-
-PACKED_NUMBERS = 32  # maximum numbers per contact in `ContactWorkspace.packed`
 
 
 def empty_problem(
@@ -164,13 +233,13 @@ def empty_problem(
         soft=np.zeros(nc),
         least=np.zeros(0),
         turn=np.zeros((nc if turning else 0, 2)),
-        node=np.zeros((nn, 8)),
+        node=Nodes.blank(nn),
         group=np.zeros(groups + 1, whole),
         block=np.full((nc, 2), -1, whole),
         J=np.zeros(numbers),
         Y=np.zeros(numbers),
         line_at=np.zeros((lines, 2), whole),
-        line_x=np.zeros((lines, 4)),
+        line_law=LineLaws.blank(lines),
         island=ends(nc),
         member=np.arange(nn),
         member_p=ends(nn),
@@ -212,10 +281,12 @@ def allocate_solver(
         inner=cache_aligned(nn + 1, 8),
         free=cache_aligned(nn + 1, 8),
         free_wide=np.zeros(nw),
-        packed=cache_aligned(nc, PACKED_NUMBERS).ravel(),
         sides=np.zeros((nc, 3), np.int64),
+        spheres=cache_aligned(nc, SphereContacts.layout.width).view(SphereContacts),
+        frictionless=cache_aligned(nc, FrictionlessContacts.layout.width).view(FrictionlessContacts),
+        frictional=cache_aligned(nc, FrictionalContacts.layout.width).view(FrictionalContacts),
     )
-    O = SolverSettings(SettingCounts.blank(), SettingReals.blank(), np.zeros((history, 4)))
+    O = SolverSettings(SettingCounts.blank(), SettingReals.blank(), SolveHistory.blank(history))
     O.count[:3] = 100, -1, history > 0
     O.real[0] = 1e-6
     return X, W, O, FactorStorage(np.zeros(0), np.zeros(0, np.int64))

@@ -35,15 +35,6 @@ from .contact_problem import (
 )
 from .gauss_seidel import sweep_lines
 from .packed_contacts import (
-    BIAS,
-    IMPULSE,
-    INVERSE_NN,
-    LEAST_NORMAL,
-    MU,
-    NS,
-    NT,
-    SLIDING_STEP,
-    SOFT,
     copy_nodes,
     count_contact_kinds,
     pack_contacts,
@@ -91,18 +82,18 @@ def pyramid_sliding_friction(d, angle):
 @formula
 def update_pyramid(P, X, W, c, at, d):
     """Update one contact: the normal impulse, then the tangential one; returns the largest change of a velocity."""
-    k = W.packed
-    u, p = contact_velocity(P, W.own, X.wide, c), k[at + IMPULSE]
-    n = max(p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN], k[at + LEAST_NORMAL])
-    x = k[at + IMPULSE + 1] - k[at + SLIDING_STEP] * (u[1] + k[at + BIAS + 1] + k[at + NS] * (n - p))
-    y = k[at + IMPULSE + 2] - k[at + SLIDING_STEP] * (u[2] + k[at + BIAS + 2] + k[at + NT] * (n - p))
-    x, y = project_on_polygon(d, k[at + MU] * n, x, y)
-    change = n - p, x - k[at + IMPULSE + 1], y - k[at + IMPULSE + 2]
-    k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2] = n, x, y
+    k = W.frictional
+    u, p = contact_velocity(P, W.own, X.wide, c), k.impulse[at, 0]
+    n = max(p - (u[0] + k.bias[at, 0] + k.soft[at] * p) * k.inverse_nn[at], k.least[at])
+    x = k.impulse[at, 1] - k.sliding_step[at] * (u[1] + k.bias[at, 1] + k.ns[at] * (n - p))
+    y = k.impulse[at, 2] - k.sliding_step[at] * (u[2] + k.bias[at, 2] + k.nt[at] * (n - p))
+    x, y = project_on_polygon(d, k.mu[at] * n, x, y)
+    change = n - p, x - k.impulse[at, 1], y - k.impulse[at, 2]
+    k.impulse[at, 0], k.impulse[at, 1], k.impulse[at, 2] = n, x, y
     X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, x, y
     apply_contact_impulse(P, W.own, X.wide, c, change)
     moved = abs(change[0]) + abs(change[1]) + abs(change[2])
-    return moved / k[at + INVERSE_NN] if moved > 0.0 else 0.0
+    return moved / k.inverse_nn[at] if moved > 0.0 else 0.0
 
 
 @formula
@@ -150,7 +141,7 @@ def pyramid(
         turned, worst = used % 2 == 1, 0.0
         for e in range(n):
             s = n - 1 - e if turned else e
-            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], 32 * s, O.count.directions))
+            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], s, O.count.directions))
         worst = larger_or_nan(worst, sweep_lines(P, X, O, turned))
         used += 1
         if O.count.history:

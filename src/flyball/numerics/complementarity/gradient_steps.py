@@ -30,32 +30,9 @@ from .contact_operator import (
     residuals,
     rolling_diagonal_block,
 )
-from .contact_problem import LINE_BIAS as LINE_BIAS
-from .contact_problem import LINE_HIGH, LINE_LOW
-from .contact_problem import LINE_SOFT as LINE_SOFT
 from .packed_contacts import (
-    ARM1,
-    ARM2,
-    BIAS,
     FRICTIONAL,
-    IMPULSE,
-    INVERSE_NN,
-    LEAST_NORMAL,
-    METRIC_RATIO,
-    MU,
-    SLIDING_STEP,
-    SOFT,
     SPHERE,
-    SPHERE_BIAS,
-    SPHERE_INVERSE_N,
-    SPHERE_INVERSE_T,
-    SPHERE_LEAST,
-    SPHERE_MU,
-    SPHERE_NORMAL,
-    SPHERE_RATIO,
-    SPHERE_SOFT,
-    SPHERE_TANGENT,
-    SPHERE_WIDTH,
     apply_point_impulse,
     apply_sphere_impulse,
     copy_nodes,
@@ -89,14 +66,20 @@ def set_vector(W, a, s, x):
 @formula
 def step_sphere(k, at, y, g, size, coulomb):
     """Impulse after a step from y against g; with d its difference from y, also d' M d and |M d|^2."""
-    x0, x1, x2, lean, slide = k[at], k[at + 1], k[at + 2], k[at + SPHERE_INVERSE_N], k[at + SPHERE_INVERSE_T]
-    gn, yn, mu = g[0] * x0 + g[1] * x1 + g[2] * x2, y[0] * x0 + y[1] * x1 + y[2] * x2, k[at + SPHERE_MU]
+    x0, x1, x2, lean, slide = (
+        k.normal[at, 0],
+        k.normal[at, 1],
+        k.normal[at, 2],
+        k.inverse_normal[at],
+        k.inverse_tangential[at],
+    )
+    gn, yn, mu = g[0] * x0 + g[1] * x1 + g[2] * x2, y[0] * x0 + y[1] * x1 + y[2] * x2, k.mu[at]
     a, b, c = g[0] - gn * x0, g[1] - gn * x1, g[2] - gn * x2
     if coulomb:
         gn += mu * sqrt(a * a + b * b + c * c)
     n = yn - size * lean * gn
     a, b, c = y[0] - yn * x0 - size * slide * a, y[1] - yn * x1 - size * slide * b, y[2] - yn * x2 - size * slide * c
-    n, part = limit_friction(n, sqrt(a * a + b * b + c * c), mu, k[at + SPHERE_RATIO], 0, k[at + SPHERE_LEAST])
+    n, part = limit_friction(n, sqrt(a * a + b * b + c * c), mu, k.ratio[at], 0, k.least[at])
     a, b, c = n * x0 + part * a, n * x1 + part * b, n * x2 + part * c
     e, f, h, n = a - y[0], b - y[1], c - y[2], n - yn
     dn, dt = n * n, e * e + f * f + h * h - n * n
@@ -106,13 +89,13 @@ def step_sphere(k, at, y, g, size, coulomb):
 @formula
 def step_frictional(k, at, y, g, size, coulomb):
     """As `step_sphere`, for any other contact, along its frame."""
-    lean, slide, gn = k[at + INVERSE_NN], k[at + SLIDING_STEP], g[0]
+    lean, slide, gn = k.inverse_nn[at], k.sliding_step[at], g[0]
     if lean == 0.0:  # immovable
         return y, 0.0, 0.0
     if coulomb:
-        gn += k[at + MU] * sqrt(g[1] * g[1] + g[2] * g[2])
+        gn += k.mu[at] * sqrt(g[1] * g[1] + g[2] * g[2])
     n, a, b = y[0] - size * lean * gn, y[1] - size * slide * g[1], y[2] - size * slide * g[2]
-    n, part = limit_friction(n, sqrt(a * a + b * b), k[at + MU], k[at + METRIC_RATIO], 0, k[at + LEAST_NORMAL])
+    n, part = limit_friction(n, sqrt(a * a + b * b), k.mu[at], k.ratio[at], 0, k.least[at])
     a, b = part * a, part * b
     dn, dt = (n - y[0]) * (n - y[0]), (a - y[1]) * (a - y[1]) + (b - y[2]) * (b - y[2])
     if slide == 0.0:
@@ -126,14 +109,14 @@ def step_rolling(P, k, c, at, y, g, way):
     size, coulomb, spin, roll = way
     (yn, ys, yt), (yz, yx, yy) = y
     (gn, gs, gt), (gz, gx, gy) = g
-    lean, slide, mu, rho, sigma = k[at + INVERSE_NN], k[at + SLIDING_STEP], k[at + MU], P.turn[c, 0], P.turn[c, 1]
+    lean, slide, mu, rho, sigma = k.inverse_nn[at], k.sliding_step[at], k.mu[at], P.turn[c, 0], P.turn[c, 1]
     if coulomb:
         gn += mu * sqrt(gs * gs + gt * gt) + rho * sqrt(gx * gx + gy * gy) + sigma * abs(gz)
     n, s, t = yn - size * lean * gn, ys - size * slide * gs, yt - size * slide * gt
     z, x, w = yz - size * spin * gz, yx - size * roll * gx, yy - size * roll * gy
     a, b, d = sqrt(lean / slide), sqrt(lean / roll), sqrt(lean / spin)  # in units in which the metric is 1
     r, q = sqrt(s * s + t * t), sqrt(x * x + w * w)
-    n = max(rolling_cone_normal(mu * a, rho * b, sigma * d, n, r * a, q * b, abs(z) * d), k[at + LEAST_NORMAL])
+    n = max(rolling_cone_normal(mu * a, rho * b, sigma * d, n, r * a, q * b, abs(z) * d), k.least[at])
     a, b, d = fraction_within(n, mu, r), fraction_within(n, rho, q), fraction_within(n, sigma, abs(z))
     s, t, z, x, w = a * s, a * t, d * z, b * x, b * w
     dn, dt, dz = (n - yn) * (n - yn), (s - ys) * (s - ys) + (t - yt) * (t - yt), (z - yz) * (z - yz)
@@ -150,7 +133,7 @@ def step_line(P, W, k, ids, par):
     y = W.lines[cur, k] + beta * (W.lines[cur, k] - W.lines[prev, k])
     g = W.lines[ucur, k] + beta * (W.lines[ucur, k] - W.lines[uprev, k]) + W.lines[BIAS_PLANE, k]
     d = W.lines[LINE_METRIC, k]
-    q = min(max(y - size * g / d, P.line_x[k, LINE_LOW]), P.line_x[k, LINE_HIGH])
+    q = min(max(y - size * g / d, P.line_law.lower[k]), P.line_law.upper[k])
     W.lines[new, k] = q
     return d * (q - y) * (q - y), g * (q - W.lines[cur, k]), d * d * (q - y) * (q - y)
 
@@ -186,11 +169,10 @@ def gradient_step(P, X, W, O, many, ids, par):
     """
     cur, prev, ucur, uprev, new = ids
     beta, size, coulomb = par
-    k, v, dd, gs, worst = W.packed, W.own, 0.0, 0.0, 0.0
+    dd, gs, worst = 0.0, 0.0, 0.0
     clear_velocities(P, X, W, O)
     for s in range(many[SPHERE] + many[FRICTIONAL]):
         ball = s < many[SPHERE]
-        at = SPHERE_WIDTH * s if ball else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
         y, u, b = (
             extrapolated(W, cur, prev, beta, s),
             extrapolated(W, ucur, uprev, beta, s),
@@ -198,11 +180,11 @@ def gradient_step(P, X, W, O, many, ids, par):
         )
         g, i, j = (u[0] + b[0], u[1] + b[1], u[2] + b[2]), W.sides[s, 0], W.sides[s, 1]
         if ball:
-            x, more, square = step_sphere(k, at, y, g, size, coulomb)
-            apply_sphere_impulse(k, v, i, j, at, (0.0, x[0], x[1], x[2]))
+            x, more, square = step_sphere(W.spheres, s, y, g, size, coulomb)
+            apply_sphere_impulse(W.spheres, W.own, i, j, s, (0.0, x[0], x[1], x[2]))
         else:
-            x, more, square = step_frictional(k, at, y, g, size, coulomb)
-            apply_frictional_impulse(k, v, W.inner, i, j, at, x)
+            x, more, square = step_frictional(W.frictional, s, y, g, size, coulomb)
+            apply_frictional_impulse(W.frictional, W.own, W.inner, i, j, s, x)
         set_vector(W, new, s, x)
         dd, worst = dd + more, larger_or_nan(worst, square)
         gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
@@ -216,12 +198,10 @@ def apply_vector(P, X, W, O, many, a):
     for s in range(many[SPHERE] + many[FRICTIONAL]):
         i, j, x = W.sides[s, 0], W.sides[s, 1], extrapolated(W, a, a, 0.0, s)
         if s < many[SPHERE]:
-            apply_sphere_impulse(W.packed, W.own, i, j, SPHERE_WIDTH * s, (0.0, x[0], x[1], x[2]))
+            apply_sphere_impulse(W.spheres, W.own, i, j, s, (0.0, x[0], x[1], x[2]))
         else:
-            apply_frictional_impulse(
-                W.packed, W.own, W.inner, i, j, SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE]), x
-            )
-    begin = general_start(many)[0]
+            apply_frictional_impulse(W.frictional, W.own, W.inner, i, j, s, x)
+    begin = general_start(many)
     for s in range(begin, begin + many[4]):
         apply_contact_impulse(P, W.own, X.wide, W.sides[s, 2], extrapolated(W, a, a, 0.0, s))
 
@@ -229,18 +209,17 @@ def apply_vector(P, X, W, O, many, a):
 @formula
 def apply_frictional_impulse(k, v, B, i, j, at, p):
     """Apply an impulse along the frame of a frictional contact."""
-    x = k[at] * p[0] + k[at + 3] * p[1] + k[at + 6] * p[2]
-    y = k[at + 1] * p[0] + k[at + 4] * p[1] + k[at + 7] * p[2]
-    z = k[at + 2] * p[0] + k[at + 5] * p[1] + k[at + 8] * p[2]
-    apply_point_impulse(k, v, B, j, at + ARM2, x, y, z)
-    apply_point_impulse(k, v, B, i, at + ARM1, -x, -y, -z)
+    x = k.frame[at, 0] * p[0] + k.frame[at, 3] * p[1] + k.frame[at, 6] * p[2]
+    y = k.frame[at, 1] * p[0] + k.frame[at, 4] * p[1] + k.frame[at, 7] * p[2]
+    z = k.frame[at, 2] * p[0] + k.frame[at, 5] * p[1] + k.frame[at, 8] * p[2]
+    apply_point_impulse(k, v, B, j, at, 1, x, y, z)
+    apply_point_impulse(k, v, B, i, at, 0, -x, -y, -z)
 
 
 @formula
 def general_start(many):
-    """First visit, and first packed number, of contacts of groups."""
-    first = many[SPHERE] + many[FRICTIONAL]
-    return first, SPHERE_WIDTH * many[SPHERE] + 32 * many[FRICTIONAL]
+    """First visit of contacts of groups."""
+    return many[SPHERE] + many[FRICTIONAL]
 
 
 @formula
@@ -249,7 +228,7 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
     cur, prev, ucur, uprev, new = ids
     beta, size, coulomb = par
     dd, gs, worst = sums
-    begin, at = general_start(many)
+    begin = general_start(many)
     for s in range(begin, begin + many[4]):
         c = W.sides[s, 2]
         y, u, b = (
@@ -266,16 +245,16 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
             b = extrapolated(W, TORQUE_OFFSET + BIAS_PLANE, BIAS_PLANE, 0.0, s)
             h = u[0] + b[0], u[1] + b[1], u[2] + b[2]
             way = size, coulomb, W.rows[ROLLING_STEPS, s, 0], W.rows[ROLLING_STEPS, s, 1]
-            x, q, more, square = step_rolling(P, W.packed, c, at, (y, z), (g, h), way)
+            x, q, more, square = step_rolling(P, W.frictional, c, s, (y, z), (g, h), way)
             for e in range(3):
                 gs += h[e] * (q[e] - W.rows[TORQUE_OFFSET + cur, s, e])
             set_vector(W, TORQUE_OFFSET + new, s, q)
             apply_torque_impulse(P, W.own, X.wide, c, q)
         else:
-            x, more, square = step_frictional(W.packed, at, y, g, size, coulomb)
+            x, more, square = step_frictional(W.frictional, s, y, g, size, coulomb)
         set_vector(W, new, s, x)
         apply_contact_impulse(P, W.own, X.wide, c, x)
-        dd, worst, at = dd + more, larger_or_nan(worst, square), at + 32
+        dd, worst = dd + more, larger_or_nan(worst, square)
         gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
     first, last = line_range(P, O)
     for e in range(first, last):
@@ -286,16 +265,24 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
 
 
 @formula
-def visit_velocity(P, X, W, s, at, ball, new):
-    """N x of visit s for vector ``new``, without torque."""
-    k, v, i, j = W.packed, W.own, W.sides[s, 0], W.sides[s, 1]
-    x = extrapolated(W, new, new, 0.0, s)
+def visit_velocity(P, X, W, at, ball, new):
+    """N x of visit ``at`` for vector ``new``, without torque."""
+    v, i, j = W.own, W.sides[at, 0], W.sides[at, 1]
+    x = extrapolated(W, new, new, 0.0, at)
     if ball:
-        u = sphere_sliding_velocity(k, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0))
-        n = k[at + SPHERE_SOFT] * (k[at] * x[0] + k[at + 1] * x[1] + k[at + 2] * x[2])
-        return u[0] + n * k[at], u[1] + n * k[at + 1], u[2] + n * k[at + 2]
-    u = frictional_velocity(k, v, i, j, at)
-    return u[0] + k[at + SOFT] * x[0], u[1], u[2]
+        u = sphere_sliding_velocity(
+            W.spheres, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0)
+        )
+        n = W.spheres.soft[at] * (
+            W.spheres.normal[at, 0] * x[0] + W.spheres.normal[at, 1] * x[1] + W.spheres.normal[at, 2] * x[2]
+        )
+        return (
+            u[0] + n * W.spheres.normal[at, 0],
+            u[1] + n * W.spheres.normal[at, 1],
+            u[2] + n * W.spheres.normal[at, 2],
+        )
+    u = frictional_velocity(W.frictional, v, i, j, at)
+    return u[0] + W.frictional.soft[at] * x[0], u[1], u[2]
 
 
 @formula
@@ -308,11 +295,10 @@ def difference_product(a, b, c):
 def apply_operator(P, X, W, O, many, ids, unew, beta):
     """Write N new to ``unew``; returns d' N d with d = new - y, and |N d|^2 in the inverse metric (without rolling)."""
     cur, prev, ucur, uprev, new = ids
-    k, total, square = W.packed, 0.0, 0.0
+    total, square = 0.0, 0.0
     for s in range(many[SPHERE] + many[FRICTIONAL]):
         ball = s < many[SPHERE]
-        at = SPHERE_WIDTH * s if ball else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
-        u = visit_velocity(P, X, W, s, at, ball, new)
+        u = visit_velocity(P, X, W, s, ball, new)
         set_vector(W, unew, s, u)
         x, y, w = (
             extrapolated(W, new, new, 0.0, s),
@@ -321,9 +307,15 @@ def apply_operator(P, X, W, O, many, ids, unew, beta):
         )
         w = u[0] - w[0], u[1] - w[1], u[2] - w[2]
         total += difference_product(x, y, w)
-        n = k[at] * w[0] + k[at + 1] * w[1] + k[at + 2] * w[2] if ball else w[0]
+        n = (
+            W.spheres.normal[s, 0] * w[0] + W.spheres.normal[s, 1] * w[1] + W.spheres.normal[s, 2] * w[2]
+            if ball
+            else w[0]
+        )
         lean, slide = (
-            (k[at + SPHERE_INVERSE_N], k[at + SPHERE_INVERSE_T]) if ball else (k[at + INVERSE_NN], k[at + SLIDING_STEP])
+            (W.spheres.inverse_normal[s], W.spheres.inverse_tangential[s])
+            if ball
+            else (W.frictional.inverse_nn[s], W.frictional.sliding_step[s])
         )
         square += lean * n * n + slide * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] - n * n)
     return apply_operator_general(P, X, W, O, many, ids, unew, beta, (total, square))
@@ -333,8 +325,8 @@ def apply_operator(P, X, W, O, many, ids, unew, beta):
 def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
     """As `apply_operator`, for contacts of groups, rolling friction and lines."""
     cur, prev, ucur, uprev, new = ids
-    k, (total, square) = W.packed, sums
-    begin, at = general_start(many)
+    total, square = sums
+    begin = general_start(many)
     for s in range(begin, begin + many[4]):
         c = W.sides[s, 2]
         x, y, w = (
@@ -347,8 +339,7 @@ def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
         set_vector(W, unew, s, u)
         w = u[0] - w[0], u[1] - w[1], u[2] - w[2]
         total += difference_product(x, y, w)
-        square += k[at + INVERSE_NN] * w[0] * w[0] + k[at + SLIDING_STEP] * (w[1] * w[1] + w[2] * w[2])
-        at += 32
+        square += W.frictional.inverse_nn[s] * w[0] * w[0] + W.frictional.sliding_step[s] * (w[1] * w[1] + w[2] * w[2])
         if P.turn.shape[0] > 0:
             x, y = (
                 extrapolated(W, TORQUE_OFFSET + new, TORQUE_OFFSET + new, 0.0, s),
@@ -362,19 +353,13 @@ def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
             total += difference_product(x, y, u) - difference_product(x, y, w)
     first, last = line_range(P, O)
     for e in range(first, last):
-        u = line_velocity(P, X.wide, e) + P.line_x[e, LINE_SOFT] * W.lines[new, e]
+        u = line_velocity(P, X.wide, e) + P.line_law.soft[e] * W.lines[new, e]
         y = W.lines[cur, e] + beta * (W.lines[cur, e] - W.lines[prev, e])
         w = W.lines[ucur, e] + beta * (W.lines[ucur, e] - W.lines[uprev, e])
         W.lines[unew, e] = u
         total += (u - w) * (W.lines[new, e] - y)
         square += (u - w) * (u - w) / W.lines[LINE_METRIC, e]
     return total, square
-
-
-@formula
-def packed_place(many, s):
-    """First packed number of visit s."""
-    return SPHERE_WIDTH * s if s < many[SPHERE] else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
 
 
 @formula
@@ -397,19 +382,18 @@ def begin_iterations(P, X, W, O, unit_metric):
                 (1.0, 1.0) if unit_metric else (steps[0], steps[6])
             )
         if unit_metric:
-            at = packed_place(many, s)
             if s < many[SPHERE]:
-                W.packed[at + SPHERE_INVERSE_N], W.packed[at + SPHERE_INVERSE_T], W.packed[at + SPHERE_RATIO] = (
+                W.spheres.inverse_normal[s], W.spheres.inverse_tangential[s], W.spheres.ratio[s] = (
                     1.0,
                     1.0,
                     1.0,
                 )
-            elif W.packed[at + INVERSE_NN] > 0.0:  # otherwise immovable
-                W.packed[at + INVERSE_NN], W.packed[at + SLIDING_STEP], W.packed[at + METRIC_RATIO] = 1.0, 1.0, 1.0
+            elif W.frictional.inverse_nn[s] > 0.0:  # otherwise immovable
+                W.frictional.inverse_nn[s], W.frictional.sliding_step[s], W.frictional.ratio[s] = 1.0, 1.0, 1.0
     start, end = line_range(P, O)
     for k in range(start, end):
         W.lines[0, k] = X.line[k]
-        W.lines[BIAS_PLANE, k] = line_velocity(P, W.free_wide, k) + P.line_x[k, LINE_BIAS]
+        W.lines[BIAS_PLANE, k] = line_velocity(P, W.free_wide, k) + P.line_law.bias[k]
         W.lines[LINE_METRIC, k] = 1.0 if unit_metric else line_diagonal(P, k)
         apply_line_impulse(P, X.wide, k, X.line[k])
     subtract_free_velocities(P, X, W, O)
@@ -419,31 +403,38 @@ def begin_iterations(P, X, W, O, unit_metric):
 
 
 @formula
-def load_visit(P, X, W, many, s):
-    """Load impulses and b of visit s."""
-    k, at, i, j, c, v = W.packed, packed_place(many, s), W.sides[s, 0], W.sides[s, 1], W.sides[s, 2], W.free
-    if s < many[SPHERE]:
-        a, b, d, n = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
+def load_visit(P, X, W, many, at):
+    """Load impulses and b of visit ``at``."""
+    i, j, c, v = W.sides[at, 0], W.sides[at, 1], W.sides[at, 2], W.free
+    if at < many[SPHERE]:
+        a, b, d, n = W.spheres.normal[at, 0], W.spheres.normal[at, 1], W.spheres.normal[at, 2], W.spheres.impulse[at]
         set_vector(
             W,
             0,
-            s,
-            (n * a + k[at + SPHERE_TANGENT], n * b + k[at + SPHERE_TANGENT + 1], n * d + k[at + SPHERE_TANGENT + 2]),
+            at,
+            (n * a + W.spheres.tangent[at, 0], n * b + W.spheres.tangent[at, 1], n * d + W.spheres.tangent[at, 2]),
         )
-        u = sphere_sliding_velocity(k, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0))
-        n = k[at + SPHERE_BIAS]
-        set_vector(W, BIAS_PLANE, s, (u[0] + n * a, u[1] + n * b, u[2] + n * d))
+        u = sphere_sliding_velocity(
+            W.spheres, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0)
+        )
+        n = W.spheres.bias[at]
+        set_vector(W, BIAS_PLANE, at, (u[0] + n * a, u[1] + n * b, u[2] + n * d))
         return
-    set_vector(W, 0, s, (k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]))
+    set_vector(W, 0, at, (W.frictional.impulse[at, 0], W.frictional.impulse[at, 1], W.frictional.impulse[at, 2]))
     u = (
-        frictional_velocity(k, v, i, j, at)
-        if s < many[SPHERE] + many[FRICTIONAL]
+        frictional_velocity(W.frictional, v, i, j, at)
+        if at < many[SPHERE] + many[FRICTIONAL]
         else contact_velocity(P, v, W.free_wide, c)
     )
-    set_vector(W, BIAS_PLANE, s, (u[0] + k[at + BIAS], u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]))
+    set_vector(
+        W,
+        BIAS_PLANE,
+        at,
+        (u[0] + W.frictional.bias[at, 0], u[1] + W.frictional.bias[at, 1], u[2] + W.frictional.bias[at, 2]),
+    )
     if P.turn.shape[0] > 0:
-        set_vector(W, TORQUE_OFFSET, s, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
-        set_vector(W, TORQUE_OFFSET + BIAS_PLANE, s, contact_angular_velocity(P, v, W.free_wide, c))
+        set_vector(W, TORQUE_OFFSET, at, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+        set_vector(W, TORQUE_OFFSET + BIAS_PLANE, at, contact_angular_velocity(P, v, W.free_wide, c))
 
 
 @formula

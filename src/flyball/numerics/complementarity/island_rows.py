@@ -74,7 +74,13 @@ def reset_group(P, head, g):
 @formula
 def is_movable(P, i):
     """Whether an impulse moves node i."""
-    return P.node[i, 0] + P.node[i, 1] + P.node[i, 2] + P.node[i, 3] > 0.0
+    return (
+        P.node.inverse_mass[i]
+        + P.node.inverse_inertia[i, 0]
+        + P.node.inverse_inertia[i, 1]
+        + P.node.inverse_inertia[i, 2]
+        > 0.0
+    )
 
 
 @formula
@@ -192,8 +198,8 @@ def list_entries(P, span, R):
 @formula
 def inertia_root(P, i):
     """Lower Cholesky factor of a node's inverse inertia: xx, yx, yy, zx, zy, zz; zero if it cannot rotate."""
-    xx, yy, zz = P.node[i, 1], P.node[i, 2], P.node[i, 3]
-    xy, xz, yz = P.node[i, 4], P.node[i, 5], P.node[i, 6]
+    xx, yy, zz = P.node.inverse_inertia[i, 0], P.node.inverse_inertia[i, 1], P.node.inverse_inertia[i, 2]
+    xy, xz, yz = P.node.inverse_inertia[i, 3], P.node.inverse_inertia[i, 4], P.node.inverse_inertia[i, 5]
     least = 1e-14 * (xx + yy + zz)
     a = sqrt(xx) if xx > least else 0.0
     b, d = (xy / a, xz / a) if a > 0.0 else (0.0, 0.0)
@@ -209,7 +215,7 @@ def inertia_root(P, i):
 def fill_node_entry(P, c, s, turning, root, G, e):
     """Compute G of a contact's side on a node, reversed on side 1; ``turning`` 1: of its rotation."""
     i, sign = P.at[c, s], 2.0 * s - 1.0
-    m = sign * sqrt(P.node[i, 0]) * (1.0 - turning)
+    m = sign * sqrt(P.node.inverse_mass[i]) * (1.0 - turning)
     x, y, z = sign * P.arm[c, 3 * s], sign * P.arm[c, 3 * s + 1], sign * P.arm[c, 3 * s + 2]
     for r in range(3):
         a, b, d = P.frame[c, 3 * r], P.frame[c, 3 * r + 1], P.frame[c, 3 * r + 2]

@@ -27,10 +27,9 @@ from .gradient_steps import (
     apply_operator,
     begin_iterations,
     gradient_step,
-    packed_place,
     report_iterate,
 )
-from .packed_contacts import INVERSE_NN, SLIDING_STEP, SPHERE, SPHERE_INVERSE_N, SPHERE_INVERSE_T
+from .packed_contacts import SPHERE
 
 
 @formula
@@ -69,13 +68,13 @@ def split_masses(P, W, O, many):
     """Shorten the steps of all contacts and lines by the counts."""
     count_contacts(P, W, O)
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
-        at, n = packed_place(many, s), most_contacts_of_side(P, W, W.sides[s, 2])
+        n = most_contacts_of_side(P, W, W.sides[s, 2])
         if s < many[SPHERE]:
-            W.packed[at + SPHERE_INVERSE_N] /= n
-            W.packed[at + SPHERE_INVERSE_T] /= n
+            W.spheres.inverse_normal[s] /= n
+            W.spheres.inverse_tangential[s] /= n
         else:
-            W.packed[at + INVERSE_NN] /= n
-            W.packed[at + SLIDING_STEP] /= n
+            W.frictional.inverse_nn[s] /= n
+            W.frictional.sliding_step[s] /= n
         if P.turn.shape[0] > 0:
             W.rows[ROLLING_STEPS, s, 0] /= n
             W.rows[ROLLING_STEPS, s, 1] /= n

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from .contact_operator import apply_contact_impulse, apply_line_impulse, contact_velocity, line_velocity
-from .contact_problem import LINE_BIAS, LINE_SOFT, ContactProblem, ContactState
+from .contact_problem import ContactProblem, ContactState
 
 MAX_UNKNOWNS = 2000  # maximum number of unknowns: takes seconds
 PIVOT_TOLERANCE = 1e-11  # relative to the largest entry of the column; smaller pivots count as zero
@@ -111,8 +111,8 @@ def delassus(P: ContactProblem, X: ContactState) -> tuple[np.ndarray, np.ndarray
         N[:, k] = velocities(v, wide)
     N[3 * np.arange(nc), 3 * np.arange(nc)] += P.soft[:nc]
     at = 3 * nc + np.arange(nl)
-    N[at, at] += P.line_x[:nl, LINE_SOFT]
-    return N, velocities(X.v, X.wide) + np.concatenate([P.bias[:nc].ravel(), P.line_x[:nl, LINE_BIAS]])
+    N[at, at] += P.line_law.soft[:nl]
+    return N, velocities(X.v, X.wide) + np.concatenate([P.bias[:nc].ravel(), P.line_law.bias[:nl]])
 
 
 def pyramid_by_lemke(P: ContactProblem, X: ContactState, directions: int = 8) -> None:

@@ -1,4 +1,4 @@
-"""Contacts packed in visiting order, all numbers of each together, and their local updates.
+"""Contacts packed by kind in visiting order, all numbers of each together, and their local updates.
 
 Contacts are grouped by kind, the kinds with the least work first: spheres without friction, spheres, others without
 friction, others with friction, and general ones (groups, rolling friction). Within a kind, successive contacts are
@@ -16,45 +16,15 @@ from ...math.scalar import sqrt
 from ...math.vec import cross, dot
 from .cone_projection import fraction_within, least_normal_impulse
 from .contact_operator import angular_response, apply_contact_impulse, apply_torque_impulse, diagonal_block, frame_axis
-from .contact_problem import FIXED_SIDE, IS_ISOTROPIC
+from .contact_problem import FIXED_SIDE
 
 SMOOTH_SPHERE, SPHERE, FRICTIONLESS, FRICTIONAL, GENERAL, CONTACT_KINDS = range(6)
-SPHERE_WIDTH, FRICTIONLESS_WIDTH = 16, 20  # numbers per contact; other kinds have 32
 INTERLEAVED_STREAMS = 4
 PARALLEL_TOLERANCE = (
     1e-20  # largest squared sine of the angle between an arm and the normal; poses far from the origin are rounded
 )
 # columns of ContactWorkspace.own
 INVERSE_MASS_COLUMN, MEAN_INERTIA_COLUMN = 6, 7  # 1/m, mean of the block's diagonal
-# places of the numbers of a sphere contact
-(
-    SPHERE_ARM1,
-    SPHERE_ARM2,
-    SPHERE_BIAS,
-    SPHERE_SOFT,
-    SPHERE_INVERSE_N,
-    SPHERE_INVERSE_T,
-    SPHERE_MU,
-    SPHERE_RATIO,
-    SPHERE_NORMAL,
-    SPHERE_TANGENT,
-    SPHERE_LEAST,
-) = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15
-# of a frictionless contact: normal, torques of a unit impulse on both sides, angular velocities they cause
-(
-    UNIT_TORQUE1,
-    UNIT_TORQUE2,
-    UNIT_SPIN1,
-    UNIT_SPIN2,
-    FRICTIONLESS_BIAS,
-    FRICTIONLESS_SOFT,
-    FRICTIONLESS_INVERSE,
-    FRICTIONLESS_NORMAL,
-    FRICTIONLESS_LEAST,
-) = 3, 6, 9, 12, 15, 16, 17, 18, 19
-# of a frictional contact: frame, arms, bias; results of `local_step_sizes`; impulse
-ARM1, ARM2, BIAS, SOFT, INVERSE_NN, NS, NT = 9, 12, 15, 18, 19, 20, 21
-ISS, IST, ITT, SLIDING_STEP, METRIC_RATIO, MU, IMPULSE, LEAST_NORMAL = 22, 23, 24, 25, 26, 27, 28, 31
 
 
 @formula
@@ -65,9 +35,11 @@ def copy_nodes(P, X, W, nodes):
         for k in range(6):
             W.own[i, k] = X.v[i, k]
             W.free[i, k] = X.v[i, k]
-            W.inner[i, k] = P.node[i, 1 + k]
-        W.own[i, INVERSE_MASS_COLUMN] = P.node[i, 0]
-        W.own[i, MEAN_INERTIA_COLUMN] = (P.node[i, 1] + P.node[i, 2] + P.node[i, 3]) / 3.0
+            W.inner[i, k] = P.node.inverse_inertia[i, k]
+        W.own[i, INVERSE_MASS_COLUMN] = P.node.inverse_mass[i]
+        W.own[i, MEAN_INERTIA_COLUMN] = (
+            P.node.inverse_inertia[i, 0] + P.node.inverse_inertia[i, 1] + P.node.inverse_inertia[i, 2]
+        ) / 3.0
     for k in range(8):
         W.own[P.size[1], k], W.inner[P.size[1], k], W.free[P.size[1], k] = 0.0, 0.0, 0.0
 
@@ -103,19 +75,11 @@ def contact_kind(P, W, c, friction_level):
         return SMOOTH_SPHERE if first and second else FRICTIONLESS
     if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
         return FRICTIONAL
-    if (i < 0 or P.node[i, 0] == 0.0) and (j < 0 or P.node[j, 0] == 0.0):
+    if (i < 0 or P.node.inverse_mass[i] == 0.0) and (j < 0 or P.node.inverse_mass[j] == 0.0):
         return FRICTIONAL
-    alike = (i < 0 or P.node[i, IS_ISOTROPIC] == 1.0) and (j < 0 or P.node[j, IS_ISOTROPIC] == 1.0)
+    alike = (i < 0 or P.node.isotropic[i] == 1.0) and (j < 0 or P.node.isotropic[j] == 1.0)
     x, y, z = P.frame[c, 6], P.frame[c, 7], P.frame[c, 8]
     return SPHERE if alike and abs(x * x + y * y + z * z - 1.0) < 1e-12 else FRICTIONAL
-
-
-@formula
-def packed_width(kind):
-    """Return the number of packed numbers of a contact of this kind."""
-    if kind == SMOOTH_SPHERE or kind == SPHERE:
-        return SPHERE_WIDTH
-    return FRICTIONLESS_WIDTH if kind == FRICTIONLESS else 32
 
 
 @formula
@@ -130,28 +94,28 @@ def interleaved_place(e, m):
 @formula
 def pack_sphere(P, X, W, c, place):
     """Pack a contact of spheres."""
-    k, i, j, r1, r2 = W.packed, P.at[c, 0], P.at[c, 1], W.rows[0, c, 1], -W.rows[0, c, 2]
+    k, i, j, r1, r2 = W.spheres, P.at[c, 0], P.at[c, 1], W.rows[0, c, 1], -W.rows[0, c, 2]
     dn, dt, p, q = 0.0, 0.0, X.p[c, 1], X.p[c, 2]
     for s in range(3):
-        k[place + s] = P.frame[c, s]
-        k[place + SPHERE_TANGENT + s] = P.frame[c, 3 + s] * p + P.frame[c, 6 + s] * q
+        k.normal[place, s] = P.frame[c, s]
+        k.tangent[place, s] = P.frame[c, 3 + s] * p + P.frame[c, 6 + s] * q
     if i >= 0:
-        dn, dt = dn + P.node[i, 0], dt + r1 * r1 * P.node[i, 1]
+        dn, dt = dn + P.node.inverse_mass[i], dt + r1 * r1 * P.node.inverse_inertia[i, 0]
     if j >= 0:
-        dn, dt = dn + P.node[j, 0], dt + r2 * r2 * P.node[j, 1]
+        dn, dt = dn + P.node.inverse_mass[j], dt + r2 * r2 * P.node.inverse_inertia[j, 0]
     dt += dn
-    k[place + SPHERE_ARM1], k[place + SPHERE_ARM2] = r1, r2
-    k[place + SPHERE_BIAS], k[place + SPHERE_SOFT] = P.bias[c, 0], P.soft[c]
-    k[place + SPHERE_INVERSE_N] = 1.0 / (dn + P.soft[c]) if dn > 0.0 else 0.0
-    k[place + SPHERE_INVERSE_T] = 1.0 / dt if dt > 0.0 else 0.0
-    k[place + SPHERE_MU], k[place + SPHERE_RATIO] = P.mu[c], dt * k[place + SPHERE_INVERSE_N]
-    k[place + SPHERE_NORMAL], k[place + SPHERE_LEAST] = X.p[c, 0], least_normal_impulse(P, c)
+    k.arm_1[place], k.arm_2[place] = r1, r2
+    k.bias[place], k.soft[place] = P.bias[c, 0], P.soft[c]
+    k.inverse_normal[place] = 1.0 / (dn + P.soft[c]) if dn > 0.0 else 0.0
+    k.inverse_tangential[place] = 1.0 / dt if dt > 0.0 else 0.0
+    k.mu[place], k.ratio[place] = P.mu[c], dt * k.inverse_normal[place]
+    k.impulse[place], k.least[place] = X.p[c, 0], least_normal_impulse(P, c)
 
 
 @formula
 def pack_frictionless(P, W, c, place):
     """Pack a contact without friction between any nodes."""
-    k, n = W.packed, frame_axis(P, c, 0)
+    k, n = W.frictionless, frame_axis(P, c, 0)
     d = P.soft[c]
     for side in range(2):
         i = P.at[c, side]
@@ -160,31 +124,38 @@ def pack_frictionless(P, W, c, place):
         if i >= 0:
             r = cross(a, n)
             g = angular_response(P, i, r)
-            d += P.node[i, 0] + dot(r, g)
+            d += P.node.inverse_mass[i] + dot(r, g)
         for s in range(3):
-            k[place + s] = n[s]
-            k[place + UNIT_TORQUE1 + 3 * side + s] = r[s]
-            k[place + UNIT_SPIN1 + 3 * side + s] = g[s]
-    k[place + FRICTIONLESS_BIAS], k[place + FRICTIONLESS_SOFT] = P.bias[c, 0], P.soft[c]
-    k[place + FRICTIONLESS_INVERSE] = 1.0 / d if d > P.soft[c] else 0.0
+            k.normal[place, s] = n[s]
+            k.torque[place, 3 * side + s] = r[s]
+            k.spin[place, 3 * side + s] = g[s]
+    k.bias[place], k.soft[place] = P.bias[c, 0], P.soft[c]
+    k.inverse[place] = 1.0 / d if d > P.soft[c] else 0.0
 
 
 @formula
 def pack_frictional(P, coulomb, W, c, place):
     """Pack a contact with friction, of nodes or groups."""
-    k, D = W.packed, diagonal_block(P, c)
+    k, D = W.frictional, diagonal_block(P, c)
     for s in range(9):
-        k[place + s] = P.frame[c, s]
+        k.frame[place, s] = P.frame[c, s]
     for s in range(6):
-        k[place + ARM1 + s] = P.arm[c, s]
+        k.arm[place, s] = P.arm[c, s]
     for s in range(3):
-        k[place + BIAS + s] = P.bias[c, s]
-    k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
+        k.bias[place, s] = P.bias[c, s]
+    k.soft[place], k.mu[place] = P.soft[c], P.mu[c]
     size = D[0] + D[3] + D[5]
     W.rows[1, c, 0] = 3.0 / (size + P.soft[c]) if size > 0.0 else 0.0
-    steps = local_step_sizes(D, P.soft[c], coulomb)
-    for s in range(8):
-        k[place + INVERSE_NN + s] = steps[s]
+    (
+        k.inverse_nn[place],
+        k.ns[place],
+        k.nt[place],
+        k.inverse_ss[place],
+        k.inverse_st[place],
+        k.inverse_tt[place],
+        k.sliding_step[place],
+        k.ratio[place],
+    ) = local_step_sizes(D, P.soft[c], coulomb)
 
 
 @formula
@@ -233,16 +204,16 @@ def count_contact_kinds(P, W, first, last, friction_level):
 @formula
 def pack_contacts(P, X, W, coulomb, first, many):
     """Pack contacts in visiting order, and apply their impulses to the velocities in W.own and X.wide."""
-    begin, at = 0, 0  # first visit and first number of a kind
+    begin = 0  # first visit of a kind
     last = first + many[0] + many[1] + many[2] + many[3] + many[4]
     for kind in range(CONTACT_KINDS):
-        e, m, wide = 0, many[kind], packed_width(kind)
+        e, m = 0, many[kind]
         for c in range(first, last if m > 0 else first):
             if W.rows[0, c, 0] == kind:
                 visit = interleaved_place(e, m)
                 e += 1
-                pack_contact(P, X, W, coulomb, c, kind, begin + visit, at + wide * visit)
-        begin, at = begin + m, at + wide * m
+                pack_contact(P, X, W, coulomb, c, kind, begin + visit)
+        begin += m
 
 
 @formula
@@ -262,39 +233,38 @@ def make_admissible(P, X, c):
 
 
 @formula
-def pack_contact(P, X, W, coulomb, c, kind, visit, place):
+def pack_contact(P, X, W, coulomb, c, kind, place):
     """Pack one contact, and apply its impulse."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
-    W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
+    W.sides[place, 0], W.sides[place, 1], W.sides[place, 2] = i, j, c
     make_admissible(P, X, c)
-    k = W.packed
     if kind == SMOOTH_SPHERE or kind == SPHERE:
         pack_sphere(P, X, W, c, place)
-        if k[place + SPHERE_NORMAL] != 0.0:
+        if W.spheres.impulse[place] != 0.0:
             apply_sphere_impulse(
-                k,
+                W.spheres,
                 W.own,
                 i,
                 j,
                 place,
                 (
-                    k[place + SPHERE_NORMAL],
-                    k[place + SPHERE_TANGENT],
-                    k[place + SPHERE_TANGENT + 1],
-                    k[place + SPHERE_TANGENT + 2],
+                    W.spheres.impulse[place],
+                    W.spheres.tangent[place, 0],
+                    W.spheres.tangent[place, 1],
+                    W.spheres.tangent[place, 2],
                 ),
             )
         return
     p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     if kind == FRICTIONLESS:
         pack_frictionless(P, W, c, place)
-        k[place + FRICTIONLESS_NORMAL], k[place + FRICTIONLESS_LEAST] = p[0], least_normal_impulse(P, c)
+        W.frictionless.impulse[place], W.frictionless.least[place] = p[0], least_normal_impulse(P, c)
     else:
         pack_frictional(P, coulomb, W, c, place)
-        k[place + LEAST_NORMAL] = least_normal_impulse(P, c)
+        W.frictional.least[place] = least_normal_impulse(P, c)
         for s in range(3):
-            k[place + IMPULSE + s] = p[s]
+            W.frictional.impulse[place, s] = p[s]
     if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
         apply_contact_impulse(P, W.own, X.wide, c, p)
     if P.turn.shape[0] > 0:
@@ -304,7 +274,7 @@ def pack_contact(P, X, W, coulomb, c, kind, visit, place):
 @formula
 def apply_sphere_impulse(k, v, i, j, at, p):
     """Apply an impulse of a contact of spheres: normal part, tangential vector in world axes."""
-    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
+    x, y, z, r1, r2 = k.normal[at, 0], k.normal[at, 1], k.normal[at, 2], k.arm_1[at], k.arm_2[at]
     n, a, b, c = p
     e, f, g = y * c - z * b, z * a - x * c, x * b - y * a  # n x tangential
     a, b, c = a + n * x, b + n * y, c + n * z
@@ -339,14 +309,14 @@ def limit_friction(n, r, mu, ratio, coulomb, least):
 @formula
 def update_smooth_sphere(k, v, i, j, at):
     """Update a contact of spheres without friction: only velocities along the normal change."""
-    x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
+    x, y, z, p = k.normal[at, 0], k.normal[at, 1], k.normal[at, 2], k.impulse[at]
     u = x * (v[j, 0] - v[i, 0]) + y * (v[j, 1] - v[i, 1]) + z * (v[j, 2] - v[i, 2])
-    q = p - (u + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
-    q = q if q > k[at + SPHERE_LEAST] else k[at + SPHERE_LEAST]
+    q = p - (u + k.bias[at] + k.soft[at] * p) * k.inverse_normal[at]
+    q = q if q > k.least[at] else k.least[at]
     d = q - p
     if d == 0.0:
         return 0.0
-    k[at + SPHERE_NORMAL] = q
+    k.impulse[at] = q
     a, b = d * v[j, INVERSE_MASS_COLUMN], d * v[i, INVERSE_MASS_COLUMN]
     v[j, 0] += a * x
     v[j, 1] += a * y
@@ -360,44 +330,46 @@ def update_smooth_sphere(k, v, i, j, at):
 @formula
 def frictionless_velocity(k, v, i, j, at):
     """Return the normal velocity of a frictionless contact, without bias."""
-    u = k[at] * (v[j, 0] - v[i, 0]) + k[at + 1] * (v[j, 1] - v[i, 1]) + k[at + 2] * (v[j, 2] - v[i, 2])
-    u += k[at + UNIT_TORQUE2] * v[j, 3] + k[at + UNIT_TORQUE2 + 1] * v[j, 4] + k[at + UNIT_TORQUE2 + 2] * v[j, 5]
-    return u - (
-        k[at + UNIT_TORQUE1] * v[i, 3] + k[at + UNIT_TORQUE1 + 1] * v[i, 4] + k[at + UNIT_TORQUE1 + 2] * v[i, 5]
+    u = (
+        k.normal[at, 0] * (v[j, 0] - v[i, 0])
+        + k.normal[at, 1] * (v[j, 1] - v[i, 1])
+        + k.normal[at, 2] * (v[j, 2] - v[i, 2])
     )
+    u += k.torque[at, 3] * v[j, 3] + k.torque[at, 4] * v[j, 4] + k.torque[at, 5] * v[j, 5]
+    return u - (k.torque[at, 0] * v[i, 3] + k.torque[at, 1] * v[i, 4] + k.torque[at, 2] * v[i, 5])
 
 
 @formula
 def update_frictionless(k, v, i, j, at):
     """Update a frictionless contact of any nodes."""
-    x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + FRICTIONLESS_NORMAL]
+    x, y, z, p = k.normal[at, 0], k.normal[at, 1], k.normal[at, 2], k.impulse[at]
     u = frictionless_velocity(k, v, i, j, at)
-    q = p - (u + k[at + FRICTIONLESS_BIAS] + k[at + FRICTIONLESS_SOFT] * p) * k[at + FRICTIONLESS_INVERSE]
-    q = q if q > k[at + FRICTIONLESS_LEAST] else k[at + FRICTIONLESS_LEAST]
+    q = p - (u + k.bias[at] + k.soft[at] * p) * k.inverse[at]
+    q = q if q > k.least[at] else k.least[at]
     d = q - p
     if d == 0.0:
         return 0.0
-    k[at + FRICTIONLESS_NORMAL] = q
+    k.impulse[at] = q
     a, b = d * v[j, INVERSE_MASS_COLUMN], d * v[i, INVERSE_MASS_COLUMN]
     v[j, 0] += a * x
     v[j, 1] += a * y
     v[j, 2] += a * z
-    v[j, 3] += d * k[at + UNIT_SPIN2]
-    v[j, 4] += d * k[at + UNIT_SPIN2 + 1]
-    v[j, 5] += d * k[at + UNIT_SPIN2 + 2]
+    v[j, 3] += d * k.spin[at, 3]
+    v[j, 4] += d * k.spin[at, 4]
+    v[j, 5] += d * k.spin[at, 5]
     v[i, 0] -= b * x
     v[i, 1] -= b * y
     v[i, 2] -= b * z
-    v[i, 3] -= d * k[at + UNIT_SPIN1]
-    v[i, 4] -= d * k[at + UNIT_SPIN1 + 1]
-    v[i, 5] -= d * k[at + UNIT_SPIN1 + 2]
-    return abs(d) / k[at + FRICTIONLESS_INVERSE]
+    v[i, 3] -= d * k.spin[at, 0]
+    v[i, 4] -= d * k.spin[at, 1]
+    v[i, 5] -= d * k.spin[at, 2]
+    return abs(d) / k.inverse[at]
 
 
 @formula
 def sphere_sliding_velocity(k, v, i, j, at, d):
     """Tangential velocity of spheres in world axes; d: relative velocity of the centres and its normal part."""
-    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
+    x, y, z, r1, r2 = k.normal[at, 0], k.normal[at, 1], k.normal[at, 2], k.arm_1[at], k.arm_2[at]
     e, f, g = r2 * v[j, 3], r2 * v[j, 4], r2 * v[j, 5]
     e, f, g = e + r1 * v[i, 3], f + r1 * v[i, 4], g + r1 * v[i, 5]
     # u = v2 - v1 - (r2 w2 + r1 w1) x n, minus its normal part
@@ -408,33 +380,31 @@ def sphere_sliding_velocity(k, v, i, j, at, d):
 @formula
 def update_sphere(k, v, i, j, at, coulomb):
     """Update a contact of spheres: the tangential impulse is a vector in world axes, uncoupled from the normal one."""
-    a, b, c, p = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], k[at + SPHERE_NORMAL]
-    un = k[at] * a + k[at + 1] * b + k[at + 2] * c
-    n = p - (un + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
-    if n <= 0.0 and p == 0.0 and coulomb and k[at + SPHERE_LEAST] == 0.0:
+    a, b, c, p = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], k.impulse[at]
+    un = k.normal[at, 0] * a + k.normal[at, 1] * b + k.normal[at, 2] * c
+    n = p - (un + k.bias[at] + k.soft[at] * p) * k.inverse_normal[at]
+    if n <= 0.0 and p == 0.0 and coulomb and k.least[at] == 0.0:
         return 0.0
     a, b, c = sphere_sliding_velocity(k, v, i, j, at, (a, b, c, un))
     it, s, t, w = (
-        k[at + SPHERE_INVERSE_T],
-        k[at + SPHERE_TANGENT],
-        k[at + SPHERE_TANGENT + 1],
-        k[at + SPHERE_TANGENT + 2],
+        k.inverse_tangential[at],
+        k.tangent[at, 0],
+        k.tangent[at, 1],
+        k.tangent[at, 2],
     )
     a, b, c = s - it * a, t - it * b, w - it * c
-    q, part = limit_friction(
-        n, sqrt(a * a + b * b + c * c), k[at + SPHERE_MU], k[at + SPHERE_RATIO], coulomb, k[at + SPHERE_LEAST]
-    )
+    q, part = limit_friction(n, sqrt(a * a + b * b + c * c), k.mu[at], k.ratio[at], coulomb, k.least[at])
     a, b, c = part * a, part * b, part * c
-    k[at + SPHERE_NORMAL], k[at + SPHERE_TANGENT], k[at + SPHERE_TANGENT + 1], k[at + SPHERE_TANGENT + 2] = q, a, b, c
+    k.impulse[at], k.tangent[at, 0], k.tangent[at, 1], k.tangent[at, 2] = q, a, b, c
     n, a, b, c = q - p, a - s, b - t, c - w
     apply_sphere_impulse(k, v, i, j, at, (n, a, b, c))
     return (abs(n) + abs(a) + abs(b) + abs(c)) / it
 
 
 @formula
-def packed_point_velocity(k, v, i, at):
-    """Velocity of the point of node i whose arm is packed at ``at``."""
-    a, b, c = k[at], k[at + 1], k[at + 2]
+def packed_point_velocity(k, v, i, at, side):
+    """Velocity of node i at the contact that it is on a side of."""
+    a, b, c = k.arm[at, 3 * side], k.arm[at, 3 * side + 1], k.arm[at, 3 * side + 2]
     e, f, g = v[i, 3], v[i, 4], v[i, 5]
     return v[i, 0] + f * c - g * b, v[i, 1] + g * a - e * c, v[i, 2] + e * b - f * a
 
@@ -442,20 +412,20 @@ def packed_point_velocity(k, v, i, at):
 @formula
 def frictional_velocity(k, v, i, j, at):
     """Velocity of a frictional contact along its frame, without bias."""
-    a, b, c = packed_point_velocity(k, v, j, at + ARM2)
-    e, f, g = packed_point_velocity(k, v, i, at + ARM1)
+    a, b, c = packed_point_velocity(k, v, j, at, 1)
+    e, f, g = packed_point_velocity(k, v, i, at, 0)
     a, b, c = a - e, b - f, c - g
     return (
-        k[at] * a + k[at + 1] * b + k[at + 2] * c,
-        k[at + 3] * a + k[at + 4] * b + k[at + 5] * c,
-        k[at + 6] * a + k[at + 7] * b + k[at + 8] * c,
+        k.frame[at, 0] * a + k.frame[at, 1] * b + k.frame[at, 2] * c,
+        k.frame[at, 3] * a + k.frame[at, 4] * b + k.frame[at, 5] * c,
+        k.frame[at, 6] * a + k.frame[at, 7] * b + k.frame[at, 8] * c,
     )
 
 
 @formula
-def apply_point_impulse(k, v, B, i, at, x, y, z):
+def apply_point_impulse(k, v, B, i, at, side, x, y, z):
     """Apply an impulse at that point to node i."""
-    a, b, c, m = k[at], k[at + 1], k[at + 2], v[i, INVERSE_MASS_COLUMN]
+    a, b, c, m = k.arm[at, 3 * side], k.arm[at, 3 * side + 1], k.arm[at, 3 * side + 2], v[i, INVERSE_MASS_COLUMN]
     e, f, g = b * z - c * y, c * x - a * z, a * y - b * x
     v[i, 0] += m * x
     v[i, 1] += m * y
@@ -468,20 +438,20 @@ def apply_point_impulse(k, v, B, i, at, x, y, z):
 @formula
 def local_impulse(k, at, u, coulomb):
     """Return the new impulse of a frictional contact at velocities u without bias; the old impulse is still in k."""
-    p, s, t = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]
-    n = p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN]
-    us, ut = u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]
+    p, s, t = k.impulse[at, 0], k.impulse[at, 1], k.impulse[at, 2]
+    n = p - (u[0] + k.bias[at, 0] + k.soft[at] * p) * k.inverse_nn[at]
+    us, ut = u[1] + k.bias[at, 1], u[2] + k.bias[at, 2]
     if coulomb:
-        n = n if n > k[at + LEAST_NORMAL] else k[at + LEAST_NORMAL]
-        us += k[at + NS] * (n - p)
-        ut += k[at + NT] * (n - p)
-        a = s - (k[at + ISS] * us + k[at + IST] * ut)
-        b = t - (k[at + IST] * us + k[at + ITT] * ut)
-        if a * a + b * b <= k[at + MU] * k[at + MU] * n * n:
+        n = n if n > k.least[at] else k.least[at]
+        us += k.ns[at] * (n - p)
+        ut += k.nt[at] * (n - p)
+        a = s - (k.inverse_ss[at] * us + k.inverse_st[at] * ut)
+        b = t - (k.inverse_st[at] * us + k.inverse_tt[at] * ut)
+        if a * a + b * b <= k.mu[at] * k.mu[at] * n * n:
             return n, a, b
     # sliding: only an equal step in all directions converges to friction opposite to the velocity
-    a, b = s - k[at + SLIDING_STEP] * us, t - k[at + SLIDING_STEP] * ut
-    q, part = limit_friction(n, sqrt(a * a + b * b), k[at + MU], k[at + METRIC_RATIO], coulomb, k[at + LEAST_NORMAL])
+    a, b = s - k.sliding_step[at] * us, t - k.sliding_step[at] * ut
+    q, part = limit_friction(n, sqrt(a * a + b * b), k.mu[at], k.ratio[at], coulomb, k.least[at])
     return q, part * a, part * b
 
 
@@ -490,13 +460,13 @@ def update_frictional(k, v, B, i, j, at, coulomb):
     """Update a frictional contact of any nodes."""
     u = frictional_velocity(k, v, i, j, at)
     n, s, t = local_impulse(k, at, u, coulomb)
-    dn, ds, dt = n - k[at + IMPULSE], s - k[at + IMPULSE + 1], t - k[at + IMPULSE + 2]
+    dn, ds, dt = n - k.impulse[at, 0], s - k.impulse[at, 1], t - k.impulse[at, 2]
     if dn == 0.0 and ds == 0.0 and dt == 0.0:
         return 0.0
-    k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2] = n, s, t
-    x = k[at] * dn + k[at + 3] * ds + k[at + 6] * dt
-    y = k[at + 1] * dn + k[at + 4] * ds + k[at + 7] * dt
-    z = k[at + 2] * dn + k[at + 5] * ds + k[at + 8] * dt
-    apply_point_impulse(k, v, B, j, at + ARM2, x, y, z)
-    apply_point_impulse(k, v, B, i, at + ARM1, -x, -y, -z)
-    return (abs(dn) + abs(ds) + abs(dt)) / k[at + INVERSE_NN]
+    k.impulse[at, 0], k.impulse[at, 1], k.impulse[at, 2] = n, s, t
+    x = k.frame[at, 0] * dn + k.frame[at, 3] * ds + k.frame[at, 6] * dt
+    y = k.frame[at, 1] * dn + k.frame[at, 4] * ds + k.frame[at, 7] * dt
+    z = k.frame[at, 2] * dn + k.frame[at, 5] * ds + k.frame[at, 8] * dt
+    apply_point_impulse(k, v, B, j, at, 1, x, y, z)
+    apply_point_impulse(k, v, B, i, at, 0, -x, -y, -z)
+    return (abs(dn) + abs(ds) + abs(dt)) / k.inverse_nn[at]

@@ -26,7 +26,6 @@ from .contact_operator import (
     line_range,
     line_velocity,
 )
-from .contact_problem import LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
 from .island_rows import BEFORE_ROLLING, BLOCKS, CONTACTS, ROWS, row_subject
 
 # columns of IslandRows.row: velocities with bias and no impulse; scaled y; its change along a step; scaled impulse;
@@ -388,7 +387,7 @@ def fill_contact(P, X, x, o, c):
 def fill_line(P, X, x, o, k):
     """Fill the data of a line."""
     x[o + FREE_VELOCITY], x[o + FREE_VELOCITY + 1], x[o + FREE_VELOCITY + 2] = (
-        line_velocity(P, X.wide, k) + P.line_x[k, LINE_BIAS],
+        line_velocity(P, X.wide, k) + P.line_law.bias[k],
         0.0,
         0.0,
     )
@@ -396,9 +395,9 @@ def fill_line(P, X, x, o, k):
     x[o + KIND], x[o + ADDED_VELOCITY] = LINE, 0.0
     x[o + FRICTION] = x[o + SCALED_MU] = 0.0
     x[o + SOFTNESS], x[o + LOWEST], x[o + HIGHEST] = (
-        P.line_x[k, LINE_SOFT],
-        P.line_x[k, LINE_LOW],
-        P.line_x[k, LINE_HIGH],
+        P.line_law.soft[k],
+        P.line_law.lower[k],
+        P.line_law.upper[k],
     )
 
 

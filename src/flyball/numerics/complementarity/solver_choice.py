@@ -101,7 +101,7 @@ def copy_line(P, X, Q, Y, line, k):
     """Copy line ``line`` of (P, X) to line k of (Q, Y)."""
     Q.line_at[k, 0], Q.line_at[k, 1], Y.line[k] = P.line_at[line, 0], P.line_at[line, 1], X.line[line]
     for s in range(4):
-        Q.line_x[k, s] = P.line_x[line, s]
+        Q.line_law[k, s] = P.line_law[line, s]
 
 
 @formula
@@ -123,7 +123,7 @@ def mass_ratio(P, I, k):
     """Largest over smallest mass of the movable nodes of an island."""
     least, most = 1e300, 0.0
     for e in range(I.member_p[k], I.member_p[k + 1]):
-        a = P.node[I.member[e], 0]
+        a = P.node.inverse_mass[I.member[e]]
         if a > 0.0:
             least, most = min(least, a), max(most, a)
     return most / least

@@ -17,9 +17,7 @@ from ...compiler.formulas import formula
 from ..integrators.time_loop import (
     ACCEPT_STEP,
     CHECK_MISSED_CHANGE,
-    CURRENT,
     INSPECT_END,
-    PROPOSED,
     ULP,
     output_buffer_full,
     set_rejected_width,
@@ -127,7 +125,7 @@ def end_on_first_event(callbacks, S, W, R, c):
     if not hit and h == c.real.t_end - c.real.t:
         hit = mark_at_final_time(callbacks, S, W, R, c, h)
     if hit and c.count.extended > 0:  # other places were evaluated: restore the end
-        return watch(c.real.t + h, c.y[PROPOSED], S, W, EXACT_VALUES), h, True
+        return watch(c.real.t + h, c.y.proposed, S, W, EXACT_VALUES), h, True
     return 0, h, hit
 
 
@@ -376,7 +374,7 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
 @formula
 def evaluate_start_guards(watch, note, S, W, c):
     """Evaluate the guards, and what they depend on, at the start of the next step. Returns a status."""
-    status = watch(c.real.t, c.y[CURRENT], S, W, START_VALUES)
+    status = watch(c.real.t, c.y.current, S, W, START_VALUES)
     if status == 0:
         note(S, W, START_VALUES)
     for i in range(W.side.shape[0]):  # a guard that jumped since has no known side

@@ -32,7 +32,7 @@ from ...compiler.formulas import formula
 from ...compiler.struct_layout import Float1, Float2, Float3, Int1, Int2, Record
 from ...errors import ModelError
 from ...math.scalar import sqrt
-from ..integrators.time_loop import INTERPOLATE, INTERPOLATED, ULP
+from ..integrators.time_loop import INTERPOLATE, ULP
 
 # direction of a guard: which sign changes are events
 FALLING, EITHER, RISING = -1, 0, 1
@@ -470,7 +470,7 @@ def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row):
         return 1
     W.count.exact_looks += 1
     W.count.all_exact_looks += 1
-    return watch(c.real.t + x * h, c.y[INTERPOLATED], S, W, row)
+    return watch(c.real.t + x * h, c.y.interpolated, S, W, row)
 
 
 @formula

@@ -20,7 +20,6 @@ from .time_loop import (
     AT_START,
     BEGIN_SEGMENT,
     CHECK_MISSED_CHANGE,
-    CURRENT,
     DISTANT_SIZE_WEIGHT,
     INSPECT_END,
     INSPECTED_END,
@@ -29,17 +28,10 @@ from .time_loop import (
     INSPECTED_START_RATE,
     INTEGRAL_TOLERANCE_FACTOR,
     INTERPOLATE,
-    INTERPOLATED,
     NOT_FINITE,
-    PREVIOUS,
-    PREVIOUS_RATE,
-    PROPOSED,
     REJECT_STEP,
-    SAVED,
-    SAVED_RATE,
     STEP_FAILED,
     TRY_STEP,
-    UNIT,
     set_rejected_width,
     step_end_time,
 )
@@ -73,7 +65,7 @@ def component_tolerance(c, i, size):
     For the first c.count.positions components, the part beyond their unit counts little: accuracy must not decrease
     because a wheel has turned a hundred times, or because the origin is far away.
     """
-    unit = c.y[UNIT, i]
+    unit = c.y.unit[i]
     if i < c.count.positions:
         size = max(min(size, unit), DISTANT_SIZE_WEIGHT * size)
     return c.real.atol * unit + c.real.rtol * size
@@ -97,7 +89,7 @@ def first_step_width(derivative, S, W, R, c):
     are taken per time in which the state changes by its own size: the width does not depend on the unit of time.
     """
     n = c.count.controlled
-    y = c.y[CURRENT]
+    y = c.y.current
     d0 = scaled_norm(c, y, y, n)
     d1 = scaled_norm(c, c.K[0], y, n)
     h0 = SMALL_FIRST_STEP * c.real.h_max
@@ -105,12 +97,12 @@ def first_step_width(derivative, S, W, R, c):
         h0 = FIRST_STEP_PART * d0 / d1
     h0 = min(max(h0, MIN_FIRST_STEP * c.real.h_max), c.real.h_max)
     for i in range(y.shape[0]):
-        c.y[PROPOSED, i] = y[i] + h0 * c.K[0, i]
-    if derivative(c.real.t + h0, c.y[PROPOSED], c.K[1], S, W) != 0:
+        c.y.proposed[i] = y[i] + h0 * c.K[0, i]
+    if derivative(c.real.t + h0, c.y.proposed, c.K[1], S, W) != 0:
         return 1e-3 * h0
     for i in range(n):
-        c.y[INTERPOLATED, i] = (c.K[1, i] - c.K[0, i]) / h0
-    d2 = scaled_norm(c, c.y[INTERPOLATED], y, n)
+        c.y.interpolated[i] = (c.K[1, i] - c.K[0, i]) / h0
+    d2 = scaled_norm(c, c.y.interpolated, y, n)
     wide = h0 / FIRST_STEP_PART
     m = max(d1, d2 * wide) * wide
     if m <= NO_CHANGE:
@@ -120,9 +112,9 @@ def first_step_width(derivative, S, W, R, c):
 
 @formula
 def attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h):
-    """Try one step of width h to c.y[PROPOSED]. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
-    y = c.y[CURRENT]
-    new = c.y[PROPOSED]
+    """Try one step of width h to c.y.proposed. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
+    y = c.y.current
+    new = c.y.proposed
     stages = R.order_i[1]
     t = c.real.t
     for i in range(1, stages):
@@ -154,7 +146,7 @@ def step_error(tangent, S, W, R, c, h, projected):
 @formula
 def error_square_sum(tangent, S, W, R, c, k, projected):
     """Sum of squares of one of the two error estimates, per second, in units of the tolerance."""
-    y, new, e = c.y[CURRENT], c.y[PROPOSED], c.y[INTERPOLATED]
+    y, new, e = c.y.current, c.y.proposed, c.y.interpolated
     n = c.count.controlled
     for i in range(n):
         e[i] = 0.0
@@ -176,7 +168,7 @@ def integral_tolerance(c):
     """Tolerance of the integrals (works): relative to the sum of their sizes and c.real.energy_size."""
     size = c.real.energy_size
     for k in range(c.integrals.shape[0]):
-        size += abs(c.y[PROPOSED, c.integrals[k]])
+        size += abs(c.y.proposed[c.integrals[k]])
     return INTEGRAL_TOLERANCE_FACTOR * c.real.rtol * size
 
 
@@ -219,7 +211,7 @@ def dense_output(R, c, x, h, out):
             for i in range(n):
                 out[i] += w * c.K[j, i]
     for i in range(n):
-        out[i] += c.y[CURRENT, i]
+        out[i] += c.y.current[i]
 
 
 @formula
@@ -232,7 +224,7 @@ def dense_output_error(R, c, h):
     s = integral_tolerance(c)
     e = less = a = a_less = 0.0
     for i in range(n):
-        size = component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(c.y[PROPOSED, i])))
+        size = component_tolerance(c, i, max(abs(c.y.current[i]), abs(c.y.proposed[i])))
         e += (dense_output_residual(R, c, 0, i) / size) ** 2
         less += (dense_output_residual(R, c, 1, i) / size) ** 2
     for k in range(m):
@@ -252,7 +244,7 @@ def stiffness_estimate(R, c, h):
     last = R.order_i[1]
     a = b = 0.0
     for i in range(c.count.controlled):
-        size = component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(c.y[PROPOSED, i])))
+        size = component_tolerance(c, i, max(abs(c.y.current[i]), abs(c.y.proposed[i])))
         d = 0.0
         for j in range(last):
             d += (R.A[last, j] - R.A[last - 1, j]) * c.K[j, i]
@@ -274,8 +266,8 @@ def dense_output_residual(R, c, k, i):
 def evaluate_dense_stages(derivative, S, W, R, c, h):
     """Evaluate the stages that only dense output needs. Returns a status."""
     for k in range(R.order_i[1] + 1, R.order_i[2]):
-        stage_state(c.y[CURRENT], c.K, R.A[k], k, h, c.y[INTERPOLATED])
-        status = derivative(c.real.t + R.c[k] * h, c.y[INTERPOLATED], c.K[k], S, W)
+        stage_state(c.y.current, c.K, R.A[k], k, h, c.y.interpolated)
+        status = derivative(c.real.t + R.c[k] * h, c.y.interpolated, c.K[k], S, W)
         if status != 0:
             return status
     return 0
@@ -288,7 +280,7 @@ def equation_defect(derivative, S, W, R, c, h, x):
     Huge if the equations cannot be evaluated there.
     """
     n = c.count.controlled
-    at = c.y[INTERPOLATED]
+    at = c.y.interpolated
     gap = c.K[R.order_i[2]]
     dense_output(R, c, x, h, at)
     if derivative(c.real.t + x * h, at, gap, S, W) != 0:
@@ -302,7 +294,7 @@ def equation_defect(derivative, S, W, R, c, h, x):
                 gap[i] -= w * c.K[j, i]
     s = 0.0
     for i in range(n):
-        s += (gap[i] / component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(at[i])))) ** 2
+        s += (gap[i] / component_tolerance(c, i, max(abs(c.y.current[i]), abs(at[i])))) ** 2
     return h * sqrt(s / max(n, 1))
 
 
@@ -328,9 +320,9 @@ def reset_rejections(c):
 def accept_explicit_step(R, c, t, h, error):
     """Make the proposed state the current one, and choose the width of the next step."""
     for i in range(c.y.shape[1]):
-        c.y[PREVIOUS, i] = c.y[CURRENT, i]
-        c.y[PREVIOUS_RATE, i] = c.K[0, i]
-        c.y[CURRENT, i] = c.y[PROPOSED, i]
+        c.y.previous[i] = c.y.current[i]
+        c.y.previous_rate[i] = c.K[0, i]
+        c.y.current[i] = c.y.proposed[i]
         c.K[0, i] = c.K[R.order_i[1], i]
     for i in range(c.seen.shape[1]):
         c.seen[INSPECTED_START, i] = c.seen[INSPECTED_END, i]
@@ -395,27 +387,27 @@ def undo_last_step(c):
     c.real.h = 0.5 * (c.real.t - c.real.before)
     c.real.t = c.real.back = c.real.before
     for i in range(c.y.shape[1]):
-        c.y[CURRENT, i] = c.y[PREVIOUS, i]
-        c.K[0, i] = c.y[PREVIOUS_RATE, i]
+        c.y.current[i] = c.y.previous[i]
+        c.K[0, i] = c.y.previous_rate[i]
     reset_rejections(c)
 
 
 @formula
 def error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
     """Whether the error of a step is mostly rounding: it changes when the last digits of the state are perturbed."""
-    y, kept = c.y[CURRENT], c.y[SAVED]
+    y, kept = c.y.current, c.y.saved
     for i in range(y.shape[0]):
         kept[i] = y[i]
-        c.y[SAVED_RATE, i] = c.K[0, i]
+        c.y.saved_rate[i] = c.K[0, i]
         if i < c.count.controlled:
-            y[i] += (STATE_ROUNDING if i % 2 == 0 else -STATE_ROUNDING) * max(abs(y[i]), c.y[UNIT, i])
+            y[i] += (STATE_ROUNDING if i % 2 == 0 else -STATE_ROUNDING) * max(abs(y[i]), c.y.unit[i])
     status, _ = arrive(c.real.t, y, c.K[0], S, W)
     other = error
     if status == 0:
         status, other = attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h)
     for i in range(y.shape[0]):
         y[i] = kept[i]
-        c.K[0, i] = c.y[SAVED_RATE, i]
+        c.K[0, i] = c.y.saved_rate[i]
     return status != 0 or not abs(other - error) < ROUNDING_ERROR_CHANGE * max(other, error)
 
 
@@ -434,7 +426,7 @@ DENSE_STAGES_KNOWN, DENSE_OUTPUT_GOOD = (
 @formula
 def begin_explicit(derivative, inspect, S, W, R, c):
     """Compute the first derivative and the first step width. Returns a status."""
-    if derivative(c.real.t, c.y[CURRENT], c.K[0], S, W) != 0:
+    if derivative(c.real.t, c.y.current, c.K[0], S, W) != 0:
         return STEP_FAILED
     inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, W)
     for i in range(c.y.shape[1]):
@@ -460,7 +452,7 @@ def interpolate_explicit(derivative, S, W, R, c):
         if not dense_output_is_accurate(R, c):
             return 1
         c.count.extended = DENSE_OUTPUT_GOOD
-    dense_output(R, c, c.real.part, c.real.tried, c.y[INTERPOLATED])
+    dense_output(R, c, c.real.part, c.real.tried, c.y.interpolated)
     return 0
 
 

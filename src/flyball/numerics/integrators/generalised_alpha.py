@@ -25,7 +25,6 @@ from .implicit_method import accept_fixed_step as enter_step
 from .implicit_workspace import STEP_START
 from .radau_stages import confirm_convergence, solve_refined, update_jacobian
 from .radau_stages import set_step_start as tolerances
-from .time_loop import CURRENT, PROPOSED, SAVED, SAVED_RATE
 
 # rows of past: a and v' at the start of the step; a at its end; v'' at the start of a segment
 ALGORITHMIC_ACCELERATION, TRUE_ACCELERATION, NEXT_ALGORITHMIC, ACCELERATION_RATE = range(4)
@@ -53,15 +52,15 @@ def begin_alpha(callbacks, S, K, c):
     at = c.y.shape[1] - K.z.shape[1] - nv
     ahead = RATE_STEP_FRACTION * c.real.step
     for i in range(nv):
-        K.d[STEP_START, i] = ahead * c.y[CURRENT, at + i]
-        K.v[STEP_START, i] = c.y[CURRENT, at + i] + ahead * c.K[0, at + i]
+        K.d[STEP_START, i] = ahead * c.y.current[at + i]
+        K.v[STEP_START, i] = c.y.current[at + i] + ahead * c.K[0, at + i]
     for i in range(K.z.shape[1]):
-        K.z[STEP_START, i] = c.y[CURRENT, at + nv + i] + (ahead * c.K[0, at + nv + i] if i < K.tol_x.shape[0] else 0.0)
-    compose(c.y[CURRENT], K.d[STEP_START], K.v[STEP_START], K.z[STEP_START], c.y[SAVED], S)
-    status, _ = arrive(c.real.t + ahead, c.y[SAVED], c.y[SAVED_RATE], S, K)
+        K.z[STEP_START, i] = c.y.current[at + nv + i] + (ahead * c.K[0, at + nv + i] if i < K.tol_x.shape[0] else 0.0)
+    compose(c.y.current, K.d[STEP_START], K.v[STEP_START], K.z[STEP_START], c.y.saved, S)
+    status, _ = arrive(c.real.t + ahead, c.y.saved, c.y.saved_rate, S, K)
     for i in range(nv + K.tol_x.shape[0]):  # x follows the velocities
         K.past[TRUE_ACCELERATION, i] = c.K[0, at + i]
-        K.past[ACCELERATION_RATE, i] = (c.y[SAVED_RATE, at + i] - c.K[0, at + i]) / ahead if status == 0 else 0.0
+        K.past[ACCELERATION_RATE, i] = (c.y.saved_rate[at + i] - c.K[0, at + i]) / ahead if status == 0 else 0.0
 
 
 @formula
@@ -220,7 +219,7 @@ def solve_step_end(callbacks, S, K, c, h, whole):
 
 @formula
 def attempt_alpha_step(callbacks, S, K, c, h):
-    """Try one step of width h to c.y[PROPOSED], with derivatives there in c.K[1].
+    """Try one step of width h to c.y.proposed, with derivatives there in c.K[1].
 
     Returns (status, 0, 1), as `radau.attempt_radau_step`.
     """
@@ -252,8 +251,8 @@ def attempt_alpha_step(callbacks, S, K, c, h):
         return status, 0.0, 1.0
     end_rates(callbacks, S, K, h)
     store_end_accelerations(K)
-    compose(c.y[CURRENT], K.d[END_ROW], K.v[END_ROW], K.z[END_ROW], c.y[PROPOSED], S)
-    status, _ = arrive(c.real.t + h, c.y[PROPOSED], c.K[1], S, K)
+    compose(c.y.current, K.d[END_ROW], K.v[END_ROW], K.z[END_ROW], c.y.proposed, S)
+    status, _ = arrive(c.real.t + h, c.y.proposed, c.K[1], S, K)
     integrate_by_trapezoids(c, h)
     return status, 0.0, 1.0
 

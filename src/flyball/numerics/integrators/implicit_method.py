@@ -1,6 +1,6 @@
 """Tasks of the `time_loop` for implicit methods of the equations of motion, and parts shared by fixed-step methods.
 
-A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[PROPOSED] and c.K[1]: status, error, suggested
+A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y.proposed and c.K[1]: status, error, suggested
 change), ``between(K, x, h, d, v, z)`` (increments, velocities, integrals within it), ``enter(K, c, t, h, error,
 asked)`` (accepts it) and ``refuse(K, c)`` (chooses the next try). Its callbacks are ``residual`` (see
 `radau_stages`); ``linearise(t, k, S, K, c)``, which fills row k of the Jacobian entries at stage k, or at the start
@@ -30,15 +30,11 @@ from .time_loop import (
     AT_START,
     BEGIN_SEGMENT,
     CHECK_MISSED_CHANGE,
-    CURRENT,
     FORCES_JUMPED,
     INSPECT_END,
     INTERPOLATE,
-    INTERPOLATED,
     NOT_FINITE,
-    PROPOSED,
     REJECT_STEP,
-    SAVED,
     STEP_FAILED,
     TRY_STEP,
     set_rejected_width,
@@ -54,14 +50,14 @@ def integrate_by_trapezoids(c, h):
     """Compute integrals over the motion at the end of the step by the trapezoidal rule."""
     for n in range(c.integrals.shape[0]):
         i = c.integrals[n]
-        c.y[PROPOSED, i] = c.y[CURRENT, i] + 0.5 * h * (c.K[0, i] + c.K[1, i])
+        c.y.proposed[i] = c.y.current[i] + 0.5 * h * (c.K[0, i] + c.K[1, i])
 
 
 @formula
 def accept_fixed_step(c, t):
     """Make the end of the step the current state."""
     for i in range(c.y.shape[1]):
-        c.y[CURRENT, i] = c.y[PROPOSED, i]
+        c.y.current[i] = c.y.proposed[i]
         c.K[0, i] = c.K[1, i]
     c.real.h = c.real.step
     c.real.t = t
@@ -153,14 +149,14 @@ def begin_implicit(arrive, inspect, S, K, c):
 
     If only forces have jumped (`FORCES_JUMPED`), the Jacobian and its factors are reused, as between steps.
     """
-    y = c.y[PROPOSED]
+    y = c.y.proposed
     for i in range(y.shape[0]):
-        y[i] = c.y[CURRENT, i]
+        y[i] = c.y.current[i]
     status, moved = arrive(c.real.t, y, c.K[0], S, K)
     if status != 0 or moved > MAX_START_CORRECTION:
         return STEP_FAILED
     for i in range(y.shape[0]):
-        c.y[CURRENT, i] = y[i]
+        c.y.current[i] = y[i]
         if not c.K[0, i] - c.K[0, i] == 0.0:
             return NOT_FINITE
     inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, K)
@@ -209,10 +205,10 @@ def restore_start_rates(K, c):
 @formula
 def interpolate_implicit(between, compose, S, K, c):
     """Interpolate the state at a part of the step."""
-    z = c.y[SAVED, : K.z.shape[1]]
+    z = c.y.saved[: K.z.shape[1]]
     restore_start_rates(K, c)
     between(K, c.real.part, c.real.tried, K.d[STEP_START], K.a[STEP_START], z)
-    compose(c.y[CURRENT], K.d[STEP_START], K.a[STEP_START], z, c.y[INTERPOLATED], S)
+    compose(c.y.current, K.d[STEP_START], K.a[STEP_START], z, c.y.interpolated, S)
     c.count.extended = 1
     return 0
 

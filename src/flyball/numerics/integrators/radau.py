@@ -38,14 +38,10 @@ from .radau_stages import (
     update_jacobian,
 )
 from .time_loop import (
-    CURRENT,
     INSPECTED_END,
     INSPECTED_END_RATE,
     INSPECTED_START,
     INSPECTED_START_RATE,
-    PREVIOUS,
-    PREVIOUS_RATE,
-    PROPOSED,
     set_rejected_width,
 )
 
@@ -203,7 +199,7 @@ def correct_with_end_jacobian(callbacks, S, K, c, h):
 
 @formula
 def attempt_radau_step(callbacks, S, K, c, h):
-    """Try one step of width h to c.y[PROPOSED]. Returns (status, error, iterations or factor of the width)."""
+    """Try one step of width h to c.y.proposed. Returns (status, error, iterations or factor of the width)."""
     residual, linearise, compose, arrive = callbacks[:4]
     set_step_start(c, K)
     start_as_stage(K, c)
@@ -234,7 +230,7 @@ def attempt_radau_step(callbacks, S, K, c, h):
             status = update_integrals(residual, S, K, c, h)
     if status != 0:
         return status, 0.0, asked
-    compose(c.y[CURRENT], K.d[2], K.v[2], K.z[2], c.y[PROPOSED], S)
+    compose(c.y.current, K.d[2], K.v[2], K.z[2], c.y.proposed, S)
     error = 0.0
     if c.real.step == 0.0:
         status, error = radau_error(residual, S, K, c, h)
@@ -242,7 +238,7 @@ def attempt_radau_step(callbacks, S, K, c, h):
             return STEP_SINGULAR, 0.0, 0.5
         if error > max(1.0, c.real.accepted_error):
             return 0, error, asked
-    status, _ = arrive(c.real.t + h, c.y[PROPOSED], c.K[1], S, K)
+    status, _ = arrive(c.real.t + h, c.y.proposed, c.K[1], S, K)
     return status, error, asked if status == 0 else 0.5
 
 
@@ -322,8 +318,8 @@ def escape_singular_position(K, c):
 def accept_radau_step(K, c, t, h, error, iterations):
     """Make the end of the step the current state, and choose the width of the next one."""
     for i in range(c.y.shape[1]):
-        c.y[PREVIOUS, i], c.y[PREVIOUS_RATE, i] = c.y[CURRENT, i], c.K[0, i]
-        c.y[CURRENT, i] = c.y[PROPOSED, i]
+        c.y.previous[i], c.y.previous_rate[i] = c.y.current[i], c.K[0, i]
+        c.y.current[i] = c.y.proposed[i]
         c.K[0, i] = c.K[1, i]
     for i in range(K.v.shape[1]):
         for k in range(4):

@@ -19,7 +19,7 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ..sparse_factorisation import lu_factor, lu_solve, sparse_product
 from .implicit_workspace import STEP_START
-from .time_loop import CURRENT, DISTANT_SIZE_WEIGHT, UNIT
+from .time_loop import DISTANT_SIZE_WEIGHT
 
 _ROOT = 6.0**0.5
 RADAU_C = ((4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0)
@@ -229,22 +229,22 @@ ITERATION_DIVERGED, ITERATION_SLOW = 1, 2
 @formula
 def set_step_start(c, K):
     """Store the velocities at the start of the step, and compute the tolerances of the step from that state."""
-    y = c.y[CURRENT]
+    y = c.y.current
     nv = K.v.shape[1]
     nq = y.shape[0] - nv - K.z.shape[1]
     for i in range(nv):
         x = unit = 1.0
         if K.place[i] >= 0:
-            x, unit = abs(y[K.place[i]]), c.y[UNIT, K.place[i]]
+            x, unit = abs(y[K.place[i]]), c.y.unit[K.place[i]]
             x = max(min(x, unit), DISTANT_SIZE_WEIGHT * x)
         K.tol[0, i] = K.real.atol * unit + K.real.rtol * x
         K.v[STEP_START, i] = y[nq + i]
-        K.tol[1, i] = K.real.atol * c.y[UNIT, nq + i] + K.real.rtol * abs(y[nq + i])
+        K.tol[1, i] = K.real.atol * c.y.unit[nq + i] + K.real.rtol * abs(y[nq + i])
     for i in range(K.z.shape[1]):
         K.z[STEP_START, i] = y[nq + nv + i]
         K.rate[STEP_START, i] = c.K[0, nq + nv + i]
     for i in range(K.tol_x.shape[0]):
-        K.tol_x[i] = K.real.atol * c.y[UNIT, nq + nv + i] + K.real.rtol * abs(K.z[STEP_START, i])
+        K.tol_x[i] = K.real.atol * c.y.unit[nq + nv + i] + K.real.rtol * abs(K.z[STEP_START, i])
 
 
 @formula
@@ -516,9 +516,9 @@ def restore_step_start(K, c):
     """Restore velocities and x at the start of the step in row STEP_START."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     for i in range(nv):
-        K.v[STEP_START, i] = c.y[CURRENT, c.y.shape[1] - nz - nv + i]
+        K.v[STEP_START, i] = c.y.current[c.y.shape[1] - nz - nv + i]
     for i in range(K.tol_x.shape[0]):
-        K.z[STEP_START, i] = c.y[CURRENT, c.y.shape[1] - nz + i]
+        K.z[STEP_START, i] = c.y.current[c.y.shape[1] - nz + i]
 
 
 @formula
@@ -530,7 +530,7 @@ def radau_integral_error(K, c, h):
     """
     size = c.real.energy_size
     for n in range(c.integrals.shape[0]):
-        size += abs(c.y[CURRENT, c.integrals[n]])
+        size += abs(c.y.current[c.integrals[n]])
     at = c.y.shape[1] - K.z.shape[1]
     s = 0.0
     for n in range(c.integrals.shape[0]):

@@ -17,12 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.formulas import formula
-from ...compiler.struct_layout import Float1, Float2, Int1, Record
+from ...compiler.struct_layout import Column, Float1, Float2, Int1, Record
 
 # StepCounts.started if no segment has begun, but only forces have jumped at its start
 FORCES_JUMPED = 2
-# rows of StepState.y: the state, the proposed one, the interpolated one; saved by trials; the previous step
-CURRENT, PROPOSED, INTERPOLATED, SAVED, SAVED_RATE, PREVIOUS, PREVIOUS_RATE, UNIT, STATE_ROWS = range(9)
 # rows of StepState.seen that the integrator uses: data of inspected laws at the start and the end of a step
 INSPECTED_START, INSPECTED_START_RATE, INSPECTED_END, INSPECTED_END_RATE = range(1, 5)
 AT_START, AT_END = -2, -1  # tasks of ``inspect``: store data of the start or end, instead of checking law k
@@ -40,7 +38,7 @@ class StepReals(Record, kind="Float"):
     h: float  # width of the next step
     t_end: float
     rtol: float
-    atol: float  # relative to the units of the state, ``StepState.y[UNIT]``
+    atol: float  # relative to the units of the state, ``StepState.y.unit``
     h_max: float
     max_growth: float  # largest factor by which the step may grow
     largest: float  # time relative to which widths of steps are judged
@@ -81,20 +79,33 @@ class StepCounts(Record, kind="Int"):
     extended: int  # dense output of the current step: 0 not used, 1 available, 2 accurate
 
 
+class StateVectors(Record, kind="Float", vectors=True):
+    """States of an integration [(ny,)]."""
+
+    current: Column
+    proposed: Column
+    interpolated: Column
+    saved: Column  # by trials
+    saved_rate: Column
+    previous: Column  # of the previous step
+    previous_rate: Column
+    unit: Column  # unit of each component
+
+
 class StepState(NamedTuple):
     """State of an integration, complete for interruption and restart."""
 
     real: StepReals  # type: ignore[assignment]
     count: StepCounts  # type: ignore[assignment]
     times: Float1  # output times, ascending
-    y: Float2  # (STATE_ROWS, ny)
+    y: StateVectors
     K: Float2  # (stages + 1, ny): derivatives of the stages, and one within the step
     integrals: Int1  # components that are integrals over the motion, such as work
     seen: Float2 = NO_INSPECTION  # data of inspected laws within a step; no columns: no inspection
 
 
 # tasks of a method: start at the current state (returns a status of the loop); try a step of width c.real.tried to
-# c.y[PROPOSED] (0 if it succeeds) and set c.real.error; interpolate at c.real.part to c.y[INTERPOLATED] (0 if it
+# c.y.proposed (0 if it succeeds) and set c.real.error; interpolate at c.real.part to c.y.interpolated (0 if it
 # succeeds); choose the next try after a rejected step (0, or 1 if there is none); check whether laws change within the
 # step without being seen at its stages; store inspection data of its end; make its end the current state and choose the
 # next width
@@ -117,8 +128,8 @@ def start_integration(callbacks, S, W, R, c, out):
         return status, used
     while c.count.next < c.times.shape[0] and c.times[c.count.next] <= c.real.t:
         for i in range(c.y.shape[1]):
-            c.y[INTERPOLATED, i] = c.y[CURRENT, i]
-        if report(c.times[c.count.next], c.y[INTERPOLATED], out[used], S, W) != 0:
+            c.y.interpolated[i] = c.y.current[i]
+        if report(c.times[c.count.next], c.y.interpolated, out[used], S, W) != 0:
             return OUTPUT_FAILED, used
         used += 1
         c.count.next += 1
@@ -144,12 +155,12 @@ def write_output(callbacks, S, W, R, c, out, used):
             break
         if s == end:
             for i in range(c.y.shape[1]):
-                c.y[INTERPOLATED, i] = c.y[PROPOSED, i]
+                c.y.interpolated[i] = c.y.proposed[i]
         else:
             c.real.part = (s - t) / h
             if ask(own, S, W, R, c, INTERPOLATE) != 0:
                 return OUTPUT_FAILED, used
-        if report(s, c.y[INTERPOLATED], out[used], S, W) != 0:
+        if report(s, c.y.interpolated, out[used], S, W) != 0:
             return OUTPUT_FAILED, used
         used += 1
         c.count.next += 1

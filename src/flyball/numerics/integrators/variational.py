@@ -39,10 +39,8 @@ from .time_loop import (
     AT_END,
     BEGIN_SEGMENT,
     CHECK_MISSED_CHANGE,
-    CURRENT,
     INSPECT_END,
     INTERPOLATE,
-    PROPOSED,
     REJECT_STEP,
     TRY_STEP,
     step_end_time,
@@ -62,21 +60,21 @@ def prepare_start(callbacks, S, K, c):
     """Evaluate forces and constraint rows at the start of a segment."""
     weigh, push, rows_to = callbacks[3], callbacks[6], callbacks[10]
     weigh(K.v[STEP_START], K.p[START_MOMENTA], S)
-    push(c.real.t, c.y[CURRENT], K.lam[STEP_START], K.f[AT_STEP_START], S)
+    push(c.real.t, c.y.current, K.lam[STEP_START], K.f[AT_STEP_START], S)
     rows_to(K.rows[AT_STEP_START], S)
 
 
 @formula
 def attempt_variational_step(callbacks, S, K, c, h):
-    """Try one step of width h to c.y[PROPOSED], with derivatives there in c.K[1]. Returns a status."""
+    """Try one step of width h to c.y.proposed, with derivatives there in c.K[1]. Returns a status."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
-        K.v[STEP_START, i] = c.y[CURRENT, at + i]
+        K.v[STEP_START, i] = c.y.current[at + i]
     if K.count.before == 0:
         prepare_start(callbacks, S, K, c)
     for i in range(nz):
-        K.z[STEP_START, i], K.rate[STEP_START, i] = c.y[CURRENT, at + nv + i], c.K[0, at + nv + i]
+        K.z[STEP_START, i], K.rate[STEP_START, i] = c.y.current[at + nv + i], c.K[0, at + nv + i]
         K.z[END_ROW, i] = K.z[STEP_START, i] + h * K.rate[STEP_START, i]
     status = solve_positions(callbacks, S, K, c, h)
     if status == 0:
@@ -86,17 +84,17 @@ def attempt_variational_step(callbacks, S, K, c, h):
     integrate_by_trapezoids(c, h)
     store_end_rates(K, c, 1)
     for i in range(nz):
-        K.z[END_ROW, i] = c.y[PROPOSED, at + nv + i]
+        K.z[END_ROW, i] = c.y.proposed[at + nv + i]
     return 0
 
 
 @formula
 def store_end_rates(K, c, end):
-    """Store rates for interpolation: velocities in c.y[PROPOSED], rates in rows 0 and ``end`` of c.K."""
+    """Store rates for interpolation: velocities in c.y.proposed, rates in rows 0 and ``end`` of c.K."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
-        K.v[END_ROW, i] = c.y[PROPOSED, at + i]
+        K.v[END_ROW, i] = c.y.proposed[at + i]
         K.ends[START_ACCELERATION, i], K.ends[END_ACCELERATION, i] = c.K[0, at + i], c.K[end, at + i]
     for i in range(nz):
         K.rate[STEP_START, i], K.rate[END_ROW, i] = c.K[0, at + nv + i], c.K[end, at + nv + i]
@@ -115,10 +113,10 @@ def solve_positions(callbacks, S, K, c, h):
     for n in range(MAX_ITERATIONS):
         if fly(K.p[FREE_MOMENTA], h, K.d[END_ROW], K.p[ARRIVAL_MOMENTA], S) != 0:
             return POSITIONS_FAILED
-        compose(c.y[CURRENT], K.d[END_ROW], K.v[STEP_START], K.z[END_ROW], c.y[PROPOSED], S)
+        compose(c.y.current, K.d[END_ROW], K.v[STEP_START], K.z[END_ROW], c.y.proposed, S)
         if nr == 0:
             return 0
-        worst = place(c.real.t + h, c.y[PROPOSED], K.g, S)
+        worst = place(c.real.t + h, c.y.proposed, K.g, S)
         if worst <= K.real.newton or (worst > STALL_RATIO * last and worst <= K.real.rounding_size):
             return 0
         if not worst < 1e3:
@@ -166,20 +164,20 @@ def solve_velocities(callbacks, S, K, c, h):
     arrive, weigh, speed, push, rows_to = callbacks[1], callbacks[3], callbacks[4], callbacks[6], callbacks[10]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
-    speed(K.p[ARRIVAL_MOMENTA], c.y[PROPOSED, at : at + nv], S)
-    push(c.real.t + h, c.y[PROPOSED], K.lam[STEP_START], K.f[TRIAL_FORCES], S)
+    speed(K.p[ARRIVAL_MOMENTA], c.y.proposed[at : at + nv], S)
+    push(c.real.t + h, c.y.proposed, K.lam[STEP_START], K.f[TRIAL_FORCES], S)
     last = 1e300
     for n in range(MAX_ITERATIONS):
         size = 0.0
         for i in range(nv):
             K.p[FREE_MOMENTA, i] = K.p[ARRIVAL_MOMENTA, i] + 0.5 * h * K.f[TRIAL_FORCES, i]
             size = max(size, abs(K.p[FREE_MOMENTA, i]), 0.5 * h * abs(K.f[TRIAL_FORCES, i]))
-        speed(K.p[FREE_MOMENTA], c.y[PROPOSED, at : at + nv], S)
+        speed(K.p[FREE_MOMENTA], c.y.proposed[at : at + nv], S)
         store_end_rates(K, c, 0 if n == 0 else 1)
-        status, _ = arrive(c.real.t + h, c.y[PROPOSED], c.K[1], S, K)
+        status, _ = arrive(c.real.t + h, c.y.proposed, c.K[1], S, K)
         if status != 0:
             return status
-        push(c.real.t + h, c.y[PROPOSED], K.found, K.f[AT_STEP_END], S)
+        push(c.real.t + h, c.y.proposed, K.found, K.f[AT_STEP_END], S)
         change = 0.0
         for i in range(nv):
             x = 0.5 * h * abs(K.f[AT_STEP_END, i] - K.f[TRIAL_FORCES, i])
@@ -188,7 +186,7 @@ def solve_velocities(callbacks, S, K, c, h):
         if change <= CONVERGED_CHANGE * size or (change > STALL_RATIO * last and change <= ROUNDING_CHANGE * size):
             rows_to(K.rows[AT_STEP_END], S)
             for i in range(nv):  # momenta are carried on; only the constraints' change is converted, to limit rounding
-                K.p[ARRIVAL_MOMENTA, i] = c.y[PROPOSED, at + i] - K.v[END_ROW, i]
+                K.p[ARRIVAL_MOMENTA, i] = c.y.proposed[at + i] - K.v[END_ROW, i]
             weigh(K.p[ARRIVAL_MOMENTA], K.p[END_MOMENTA], S)
             for i in range(nv):
                 K.p[END_MOMENTA, i] += K.p[FREE_MOMENTA, i]

@@ -20,11 +20,10 @@ from ...errors import SimulationError
 from ...model.contact_point import Touch
 from ...model.event import Event, Lock, Release
 from ...model.event_validation import lock_target
-from ...numerics.integrators.time_loop import CURRENT, StepState
+from ...numerics.integrators.time_loop import StepState
 from ...results.result import Result
 from ...tables.constraint_rows import SwitchSpec
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import VALUE
 from ..initial_state import InitialState
 
 
@@ -144,7 +143,7 @@ class EventContext:
     @property
     def y(self) -> np.ndarray:
         """The state (q, v, z) at the instant, writable in place, (ny,)."""
-        return self.clock.y[CURRENT]
+        return self.clock.y.current
 
     @property
     def group(self) -> ForceDistribution:
@@ -170,7 +169,7 @@ class EventContext:
     def names(self) -> dict[str, float]:
         """Return the values of all names in event expressions, at the state last evaluated."""
         c, sensed = self.c, self.c.work.sensed
-        return {"t": self.t, **c.values.env, **{k: float(sensed[VALUE, m]) for k, m in self.structure.slots.items()}}
+        return {"t": self.t, **c.values.env, **{k: float(sensed.value[m]) for k, m in self.structure.slots.items()}}
 
 
 PRINTED_ZERO = 1e-12  # m or rad: printed as 0
@@ -217,15 +216,15 @@ def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
     in the workspace.
     """
     S, W, out = here.c.system, here.c.work, dict[int, float]()
-    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
+    ways = W.sensed.value[W.sensed.shape[1] - W.modes.mode.shape[0] :]
     for s, spec in enumerate(here.structure.switches):
         kind = spec.switch.kind
         if kind.keeps_bounds:
-            past = kind.distance_from_bounds(W.modes, S.switch_numbers, s, W.sensed[VALUE, spec.measured])
+            past = kind.distance_from_bounds(W.modes, S.switch_numbers, s, W.sensed.value[spec.measured])
             if past > near[s]:
                 out[s] = past
             elif W.modes.mode[s] == HELD:
-                kind.follow_bound(W.modes, ways, s, W.sensed[VALUE, spec.measured], near[s])
+                kind.follow_bound(W.modes, ways, s, W.sensed.value[spec.measured], near[s])
     return out
 
 
@@ -249,7 +248,7 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
             W.modes.lower[k], W.modes.upper[k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
             here.given += elastic_energy(here, k)
             continue
-        x = W.sensed[VALUE, S.switches.measured[k]]
+        x = W.sensed.value[S.switches.measured[k]]
         if held.joint and abs(x) > CLOSED_TOLERANCE * here.c.values.length:
             raise SimulationError(
                 f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and can lock again only "
@@ -265,7 +264,7 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
 def release(here: EventContext, e: Event, a: Release) -> str:
     """Release coordinates, a joint, a limit or a rope."""
     W = here.c.work
-    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
+    ways = W.sensed.value[W.sensed.shape[1] - W.modes.mode.shape[0] :]
     held, switches = lock_target(here.structure.model, e, a), here.structure.switches
     every = switch_numbers_of(here, held.coordinates, held.joint, held.element)
     if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
@@ -284,7 +283,7 @@ def elastic_energy(here: EventContext, k: int) -> float:
     S, W = here.c.system, here.c.work
     if not here.structure.switches[k].switch.kind.elastic:
         return 0.0
-    x = W.sensed[VALUE, S.switches.measured[k]]
+    x = W.sensed.value[S.switches.measured[k]]
     depth = max(W.modes.lower[k] - x, x - W.modes.upper[k], 0.0)
     return float(0.5 * S.switch_numbers.stiffness[k] * depth**2)
 
@@ -316,4 +315,4 @@ def restore_locks(here: EventContext, before: Result) -> None:
             W.modes.mode[k], W.modes.hold[k] = last.modes.mode[j], last.modes.hold[j]
         elif last.modes.released[j] == RELEASED:
             W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = RELEASED, -np.inf, np.inf
-            W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] + k] = FROZEN if spec.switch.kind.elastic else 0.0
+            W.sensed.value[W.sensed.shape[1] - W.modes.mode.shape[0] + k] = FROZEN if spec.switch.kind.elastic else 0.0

@@ -25,7 +25,7 @@ from ...tables.contact_places import contact_places
 from ...tables.element_numbers import names_in
 from ...tables.law_inputs import forces_in_events
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import VALUE, assign, map_arrays
+from ...tables.table_definitions import assign, map_arrays
 from ...tables.values import Values, values
 from .context import (
     EventContext,
@@ -178,7 +178,7 @@ def _refuse_violated_bounds(here: EventContext, who: str) -> None:
     if past:
         k = max(past, key=past.__getitem__)
         spec, unit = s.switches[k], switch_units(s)[k]
-        bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
+        bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed.value[spec.measured]
         said = spec.switch.kind.misplaced or violated_rule(spec, float(x), bounds, unit)
         raise SimulationError(
             f"at t = {here.t:.9g} s {who} would put {spec.element.title} instantaneously, by {past[k]:.3g} {unit}: "

@@ -46,11 +46,11 @@ from ...numerics.event_location.guards import (
 )
 from ...numerics.integrators import time_loop as ex
 from ...numerics.integrators.butcher_tableaux import tableau
-from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...progress import ReportProgress
 from ...results.phases import Phase, RecordedModes, event_energies, phases_or_none
 from ...results.result import Result
-from ...tables.table_definitions import VALUE, assign
+from ...tables.table_definitions import assign
 from ..implicit.integrators import implicit_integrator
 from ..integration_intervals import IMPLICIT_STEP_WEIGHT, SegmentEnd, SmoothIntervals, known_breaks
 from ..integration_options import Integration
@@ -108,7 +108,7 @@ class OccurrenceTimes:
         """
         W = here.c.work
         first = W.sensed.shape[1] - W.modes.mode.shape[0]
-        now = np.vstack((*W.modes, W.sensed[VALUE, first:])), len(here.records)
+        now = np.vstack((*W.modes, W.sensed.value[first:])), len(here.records)
         old, self._before = self._before, now
         same = old is not None and old[1] == now[1] and np.array_equal(old[0], now[0])
         if not same or self.empty == 0:
@@ -225,7 +225,7 @@ class PhaseRecorder:
         """Record rows that the compiled loop has just written (possibly none), with the present modes."""
         c, W = here.c, here.c.work
         n = len(here.structure.switches)
-        ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
+        ways = W.sensed.value[W.sensed.shape[1] - n :].copy()
         if slides_on_corner(c):
             ways = _switch_states(here, rows)
         _clear_held_rates(here, rows)
@@ -272,7 +272,7 @@ def _switch_states(here: EventContext, rows: np.ndarray) -> np.ndarray:
     for k, row in enumerate(rows):
         again.z = row[1 + s.nq + s.nv : 1 + len(here.y)].copy()
         again.at(row[0], row[1 : 1 + s.nq], row[1 + s.nq : 1 + s.nq + s.nv], MOTION)
-        out[:, k] = again.work.sensed[VALUE, again.work.sensed.shape[1] - n :]
+        out[:, k] = again.work.sensed.value[again.work.sensed.shape[1] - n :]
     return out
 
 
@@ -291,7 +291,7 @@ def distribute_forces(here: EventContext, rows: np.ndarray) -> None:
     assign(W.modes, here.c.work.modes)
     W.sensed[:] = here.c.work.sensed
     none, R = np.zeros(0, np.int64), tableau("rk45")
-    seen, state = np.zeros((INSPECTION_ROWS, 0)), np.zeros((STATE_ROWS, ny))
+    seen, state = np.zeros((INSPECTION_ROWS, 0)), StateVectors.blank(ny)
     own = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), state, np.zeros((1, ny)), none, seen)
     sheet = OutputBuffer(np.zeros((4, max(s.nv, len(S.rows.law), 1))))
     address = engine.address

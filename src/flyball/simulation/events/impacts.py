@@ -20,7 +20,6 @@ import numpy as np
 from ...engine.calls import MOTION
 from ...engine.mode_complementarity import SUDDEN_IMPULSES, ModeProblem
 from ...numerics.complementarity.dense_problem import BILATERAL, SOLUTION_FOUND, UNILATERAL, DenseProblem
-from ...tables.table_definitions import BIAS
 from .instant_problem import InstantProblem, ProblemRow
 
 REST_RATE = 1e-12  # part of its terms below which a rate after the jump counts as zero
@@ -233,7 +232,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
         return over
     n.run_engine(MOTION)
     nq = n.S.sizes.coordinates
-    a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
+    a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed.bias[n.m[leaving]]
     far = ORIGIN_ROUNDING * np.abs(n.W.FK[:, :3]).max(initial=0.0)
     for s, acceleration in zip(leaving, a.tolist(), strict=True):
         u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration

@@ -57,8 +57,7 @@ from ...numerics.complementarity.dense_problem import (
     allocate_dense,
 )
 from ...numerics.integrators.butcher_tableaux import tableau
-from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
-from ...tables.table_definitions import BIAS, VALUE
+from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from .context import RELEASED, EventContext, switch_scales, switch_units
 
 POSITION_TOLERANCE = 1e-10  # distance at which a bound is reached, relative to the mechanism's length or a radian
@@ -110,7 +109,7 @@ class InstantProblem:
         self.force = S.switches.force
         self.first = self.W.sensed.shape[1] - len(self.m)
         ny, width = len(here.y), max(s.nv, len(S.rows.law), len(S.guards.kind), 1)
-        none, y = np.zeros(0, np.int64), np.zeros((STATE_ROWS, ny))
+        none, y = np.zeros(0, np.int64), StateVectors.blank(ny)
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         R, self.output = tableau("rk45"), OutputBuffer(np.zeros((4, width)))
@@ -158,15 +157,15 @@ class InstantProblem:
         which, modes = np.flatnonzero(self.m >= 0), self.W.modes.mode.copy()
         self.switch_off_decided()
         self.put()
-        self.desk.y[0, nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
+        self.desk.y.current[nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
         self.engine(MOTION)
         q_dot, out, before = self.desk.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
         for step in (0.0, POSITION_ROUNDING, -POSITION_ROUNDING):
             self.put()
-            self.desk.y[0, :nq] += step * q_dot
+            self.desk.y.current[:nq] += step * q_dot
             if self.engine(MOTION) != 0:
                 break
-            a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed[BIAS, self.m[which]]
+            a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed.bias[self.m[which]]
             before = a if step == 0.0 else before
             out[which] = np.fmax(out[which], np.abs(a - before))
         self.W.modes.mode[:] = modes
@@ -193,12 +192,12 @@ class InstantProblem:
 
     def ways(self) -> np.ndarray:
         """Return the states of all switches, writable in place."""
-        return self.W.sensed[VALUE, self.first :]
+        return self.W.sensed.value[self.first :]
 
     def put(self) -> None:
         """Copy time and state of the motion into the workspace."""
         self.desk.real.t = self.here.t
-        self.desk.y[0] = self.here.y
+        self.desk.y.current = self.here.y
 
     def run_engine(self, task: int) -> int:
         """Run a task of the engine at the state of the motion, on a copy of it."""
@@ -239,7 +238,7 @@ class InstantProblem:
         self.run_engine(MOTION)
         nq = self.S.sizes.coordinates
         vdot = self.desk.K[0, nq : nq + self.here.structure.nv]
-        return float(self.gradients(np.array([s]))[0] @ vdot + self.W.sensed[BIAS, self.m[s]])
+        return float(self.gradients(np.array([s]))[0] @ vdot + self.W.sensed.bias[self.m[s]])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return accelerations, multipliers and driver efforts due to a generalised force at the state last
@@ -301,7 +300,7 @@ class InstantProblem:
     def project(self) -> None:
         """Project the state onto the active rows."""
         if self.run_engine(ARRIVE) == 0:
-            self.here.y[:] = self.desk.y[0]
+            self.here.y[:] = self.desk.y.current
 
     def guards(self) -> np.ndarray:
         """Return the values of all guards, (ng,)."""

@@ -26,7 +26,6 @@ from ...numerics.complementarity.dense_problem import (
     UNILATERAL,
 )
 from ...tables.structure_definition import Structure
-from ...tables.table_definitions import LOAD
 from .context import RELEASED, EventContext
 from .force_distribution import held_at_rest, released_by_group, sliding_without_solution, write_sharing_group
 from .instant_problem import (
@@ -308,7 +307,7 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
     write_sharing_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
         W.counts.load_updates = SLOPES_UNKNOWN
-        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from zero load
+        W.sensed.load[2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from zero load
 
 
 # Rates in event expressions that active rows keep at zero: their values are rounding.

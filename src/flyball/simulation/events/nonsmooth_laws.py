@@ -24,7 +24,6 @@ from ...engine.rows import count_measured
 from ...errors import SimulationError
 from ...laws.bytecode import BY_MOTION, BY_TIME, evaluate_jet
 from ...results.events import EventRecord
-from ...tables.table_definitions import VALUE
 from .impacts import LOW_FLIGHT
 from .instant_problem import RATE_TOLERANCE, InstantProblem
 
@@ -272,7 +271,7 @@ class Corners:
         S, W, t = self.n.S, self.n.W, self.n.here.t
         size = abs(t * corner_derivatives(self.n, s, BY_TIME)[1])
         for m in range(2 * count_measured(S)):
-            size += abs(W.sensed[VALUE, m] * corner_derivatives(self.n, s, m)[1])
+            size += abs(W.sensed.value[m] * corner_derivatives(self.n, s, m)[1])
         return float(corner_value(S, W, t, s)), CORNER_ROUNDING * float(size)
 
     def _rounding_of(self, s: int, u: float, least: float) -> float:

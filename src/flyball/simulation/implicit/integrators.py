@@ -81,7 +81,7 @@ class ImplicitIntegrator:
         initialise_work(s, self._complex_tables(S).fields, lambda name: self.own.array(f"WC.{name}"))
         self.own.array("WC.options").rate = c.array("options").rate
         if len(s.rows):
-            self.own.array("plan.metric")[:] = inverse_inertias(c, float(clock.real.t), clock.y[ex.CURRENT])
+            self.own.array("plan.metric")[:] = inverse_inertias(c, float(clock.real.t), clock.y.current)
         self.count = self.own.array("desk.count")
         self._settle(self.own.array("desk.real"), len(S.angles.F) > 0)
 

@@ -15,31 +15,11 @@ to rows u + bias + soft p >= 0. Displacements end at the overlaps b.
 from __future__ import annotations
 
 from ...collision.shape_kinds import SPHERE
-from ...collision.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...numerics.complementarity.contact_operator import contact_velocity, diagonal_block
 from ...tables.table_definitions import DAMPING, DISSIPATION, EXPONENT, MODULUS, STIFFNESS
 from .free_bodies import rest_speed
-from .stepping_tables import (
-    DIVIDES_STEPS,
-    HISTORY_END_GAP,
-    HISTORY_LAW_OVERLAP,
-    HISTORY_OVERLAP,
-    HISTORY_OVERLAP_RATE,
-    HISTORY_SHARE,
-    HISTORY_SPRING_OVERLAP,
-    HISTORY_STIFFNESS,
-    LAST_STEP,
-    LONGEST_STEP,
-    LOST_IMPACT,
-    NUMERICAL,
-    STEP,
-    STEPS_TAKEN,
-    STORED_AT_START,
-    STORED_ENERGY,
-    VELOCITY_TOLERANCE,
-)
 
 LAW_ITERATIONS = 20  # Newton iterations; three or four are usual
 FEW_LAW_ITERATIONS = 3  # iterations where the cone solver does not converge
@@ -53,7 +33,7 @@ RESOLVED_STIFFNESS = 0.01  # largest h^2 k' / 4 m that resolves an impact: 20 st
 @formula
 def contact_law(G, C, L, c):
     """Return exponent, dissipation, damping, stiffness and modulus of contact c."""
-    a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
+    a, b = G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]]
     return (
         L.pair[a, b, EXPONENT],
         L.pair[a, b, DISSIPATION],
@@ -69,10 +49,9 @@ def contact_stiffness(G, C, L, c):
     _, _, _, k, modulus = contact_law(G, C, L, c)
     if modulus > 0.0:
         s = 0.0
-        for side in (SHAPE_1, SHAPE_2):
-            i = C.at[c, side]
-            if G.shape_i[i, KIND] == SPHERE:
-                s += 1.0 / G.shape_x[i, PAR]
+        for i in (C.at.shape_1[c], C.at.shape_2[c]):
+            if G.shape.kind[i] == SPHERE:
+                s += 1.0 / G.dimensions.par[i, 0]
         return modulus / sqrt(s)
     return k
 
@@ -119,37 +98,35 @@ def law_impulse(k, law, a, b, h, share):
 @formula
 def end_overlap(now, c, h, u):
     """Return the overlap at the end of the step in the contact law, given the rate u there."""
-    s = now[c, HISTORY_SHARE]
-    return now[c, HISTORY_OVERLAP] - h * (0.5 * (1.0 - s) * now[c, HISTORY_OVERLAP_RATE] + 0.5 * (1.0 + s) * u)
+    s = now.implicit_share[c]
+    return now.overlap[c] - h * (0.5 * (1.0 - s) * now.overlap_rate[c] + 0.5 * (1.0 + s) * u)
 
 
 @formula
-def find_compliant_contacts(G, C, P, L, X, pace, now, before):
+def find_compliant_contacts(G, C, P, L, X, state, now, before):
     """Store the data of compliant contacts at the start of the step. Returns whether there are any."""
     any_ = False
-    gone = pace.real[STORED_ENERGY]
-    for c in range(C.count[FOUND]):
-        k, o = contact_stiffness(G, C, L, c), C.at[c, BEFORE]
-        now[c, HISTORY_STIFFNESS] = k
+    gone = state.sums.elastic_energy
+    for c in range(C.count.found):
+        k, o = contact_stiffness(G, C, L, c), C.at.before[c]
+        now.stiffness[c] = k
         if k > 0.0:
             any_ = True
-            now[c, HISTORY_OVERLAP] = now[c, HISTORY_LAW_OVERLAP] = now[c, HISTORY_SPRING_OVERLAP] = -C.x[c, GAP]
-            now[c, HISTORY_OVERLAP_RATE] = contact_velocity(P, X.v, X.wide, c)[0]
+            now.overlap[c] = now.law_overlap[c] = now.spring_overlap[c] = -C.x.gap[c]
+            now.overlap_rate[c] = contact_velocity(P, X.v, X.wide, c)[0]
             if o >= 0:
-                now[c, HISTORY_LAW_OVERLAP], now[c, HISTORY_SPRING_OVERLAP] = (
-                    before[o, HISTORY_LAW_OVERLAP],
-                    before[o, HISTORY_SPRING_OVERLAP],
+                now.law_overlap[c], now.spring_overlap[c] = (
+                    before.law_overlap[o],
+                    before.spring_overlap[o],
                 )
-                gone -= elastic_energy(k, contact_law(G, C, L, c)[0], before[o, HISTORY_SPRING_OVERLAP])
-            elif pace.count[STEPS_TAKEN] > 0:
-                now[c, HISTORY_SPRING_OVERLAP] = 0.0
-    pace.real[NUMERICAL] += gone
-    if pace.count[STEPS_TAKEN] == 0:
-        pace.real[STORED_AT_START] = 0.0
-        for c in range(C.count[FOUND]):
-            pace.real[STORED_AT_START] += elastic_energy(
-                now[c, HISTORY_STIFFNESS], contact_law(G, C, L, c)[0], -C.x[c, GAP]
-            )
+                gone -= elastic_energy(k, contact_law(G, C, L, c)[0], before.spring_overlap[o])
+            elif state.counts.steps_taken > 0:
+                now.spring_overlap[c] = 0.0
+    state.sums.numerical_loss += gone
+    if state.counts.steps_taken == 0:
+        state.sums.elastic_at_start = 0.0
+        for c in range(C.count.found):
+            state.sums.elastic_at_start += elastic_energy(now.stiffness[c], contact_law(G, C, L, c)[0], -C.x.gap[c])
     return any_
 
 
@@ -166,80 +143,72 @@ def start_overlap(now, c, k, n, new):
     A contact too stiff for the step has the overlap with which its law ended. Rotation of the surfaces increases the
     overlap, which displacements remove. Appearing contact points take over the energy of disappearing ones.
     """
-    s, kept = now[c, HISTORY_SHARE], now[c, HISTORY_SPRING_OVERLAP]
-    now[c, HISTORY_OVERLAP] = elastic_overlap(s, now[c, HISTORY_OVERLAP], kept)
+    s, kept = now.implicit_share[c], now.spring_overlap[c]
+    now.overlap[c] = elastic_overlap(s, now.overlap[c], kept)
     if new:
-        return elastic_energy(k, n, now[c, HISTORY_OVERLAP])
-    return s * (elastic_energy(k, n, now[c, HISTORY_OVERLAP]) - elastic_energy(k, n, kept))
+        return elastic_energy(k, n, now.overlap[c])
+    return s * (elastic_energy(k, n, now.overlap[c]) - elastic_energy(k, n, kept))
 
 
 @formula
-def expected_speed(C, now, before, c, pace):
+def expected_speed(C, now, before, c, state):
     """Return the normal speed of contact c plus its expected change in the step, as in the step before."""
-    o = C.at[c, BEFORE]
-    change = (
-        now[c, HISTORY_OVERLAP_RATE] - before[o, HISTORY_OVERLAP_RATE]
-        if o >= 0 and before[o, HISTORY_STIFFNESS] > 0.0
-        else 0.0
-    )
-    part = pace.real[STEP] / pace.real[LAST_STEP] if pace.real[LAST_STEP] > 0.0 else 0.0
-    return abs(now[c, HISTORY_OVERLAP_RATE]) + part * abs(change)
+    o = C.at.before[c]
+    change = now.overlap_rate[c] - before.overlap_rate[o] if o >= 0 and before.stiffness[o] > 0.0 else 0.0
+    part = state.times.step / state.times.last_step if state.times.last_step > 0.0 else 0.0
+    return abs(now.overlap_rate[c]) + part * abs(change)
 
 
 @formula
-def start_compliant_rows(G, C, P, L, X, pace, now, before):
+def start_compliant_rows(G, C, P, L, X, state, now, before):
     """Choose the implicit shares s by stiffness, and the first rows; ``X``: velocities without contact.
 
     Rows are tangent to the law at the overlap of the step before, or at that with these velocities. Returns whether the
     step must be divided because it is too long for an impact.
     """
-    h, too_long = pace.real[STEP], False
-    slow = rest_speed(pace, pace.real[LONGEST_STEP])
-    for c in range(C.count[FOUND]):
-        k = now[c, HISTORY_STIFFNESS]
+    h, too_long = state.times.step, False
+    slow = rest_speed(state, state.times.longest_step)
+    for c in range(C.count.found):
+        k = now.stiffness[c]
         if k > 0.0:
             n = contact_law(G, C, L, c)[0]
             u = contact_velocity(P, X.v, X.wide, c)[0]
-            z = max(now[c, HISTORY_OVERLAP], now[c, HISTORY_OVERLAP] - h * u)
+            z = max(now.overlap[c], now.overlap[c] - h * u)
             z = 0.25 * h * h * elastic_force(k, n, z)[1] * diagonal_block(P, c)[0]
-            s = now[c, HISTORY_SHARE] = z * z / (1.0 + z * z)
-            too_long = too_long or (z > RESOLVED_STIFFNESS and expected_speed(C, now, before, c, pace) > slow)
-            if pace.count[STEPS_TAKEN] > 0:
-                pace.real[NUMERICAL] -= start_overlap(now, c, k, n, C.at[c, BEFORE] < 0)
-            if now[c, HISTORY_LAW_OVERLAP] > 0.0:
-                u = (
-                    now[c, HISTORY_OVERLAP]
-                    - now[c, HISTORY_LAW_OVERLAP]
-                    - 0.5 * h * (1.0 - s) * now[c, HISTORY_OVERLAP_RATE]
-                ) / (0.5 * h * (1.0 + s))
-            tangent_row(G, C, P, L, pace, now, c, u)
-    return too_long and pace.count[DIVIDES_STEPS] != 0
+            s = now.implicit_share[c] = z * z / (1.0 + z * z)
+            too_long = too_long or (z > RESOLVED_STIFFNESS and expected_speed(C, now, before, c, state) > slow)
+            if state.counts.steps_taken > 0:
+                state.sums.numerical_loss -= start_overlap(now, c, k, n, C.at.before[c] < 0)
+            if now.law_overlap[c] > 0.0:
+                u = (now.overlap[c] - now.law_overlap[c] - 0.5 * h * (1.0 - s) * now.overlap_rate[c]) / (
+                    0.5 * h * (1.0 + s)
+                )
+            tangent_row(G, C, P, L, state, now, c, u)
+    return too_long and state.options.divides_steps != 0
 
 
 @formula
-def tangent_row(G, C, P, L, pace, now, c, u):
+def tangent_row(G, C, P, L, state, now, c, u):
     """Linearise row c at the velocity u; return the impulse there."""
-    h, mobility = pace.real[STEP], diagonal_block(P, c)[0]
-    now[c, HISTORY_LAW_OVERLAP] = end_overlap(now, c, h, u)
+    h, mobility = state.times.step, diagonal_block(P, c)[0]
+    now.law_overlap[c] = end_overlap(now, c, h, u)
     law = contact_law(G, C, L, c)
-    p, slope = law_impulse(
-        now[c, HISTORY_STIFFNESS], law, now[c, HISTORY_OVERLAP], now[c, HISTORY_LAW_OVERLAP], h, now[c, HISTORY_SHARE]
-    )
-    slope *= 0.5 * h * (1.0 + now[c, HISTORY_SHARE])
+    p, slope = law_impulse(now.stiffness[c], law, now.overlap[c], now.law_overlap[c], h, now.implicit_share[c])
+    slope *= 0.5 * h * (1.0 + now.implicit_share[c])
     P.soft[c] = 1.0 / slope if slope * LARGEST_COMPLIANCE * mobility > 1.0 else LARGEST_COMPLIANCE * mobility
     P.bias[c, 0] = -u - P.soft[c] * p
     return p
 
 
 @formula
-def linearise_compliant_rows(G, C, P, L, X, pace, now):
+def linearise_compliant_rows(G, C, P, L, X, state, now):
     """Linearise compliant rows at the velocities of ``X``; return the largest error of the previous rows [m/s]."""
     worst = 0.0
-    for c in range(C.count[FOUND]):
-        if now[c, HISTORY_STIFFNESS] > 0.0:
+    for c in range(C.count.found):
+        if now.stiffness[c] > 0.0:
             u = contact_velocity(P, X.v, X.wide, c)[0]
             row = -(u + P.bias[c, 0]) / P.soft[c] if P.soft[c] > 0.0 else 0.0
-            p = tangent_row(G, C, P, L, pace, now, c, u)
+            p = tangent_row(G, C, P, L, state, now, c, u)
             worst = max(worst, diagonal_block(P, c)[0] * abs(max(p, 0.0) - max(row, 0.0)))
     return worst
 
@@ -255,9 +224,9 @@ def restore_free_velocities(N, M, X):
 @formula
 def remaining_gap(now, c, gap):
     """Return the gap at the end of the step beyond that at which the law of contact c ends, if it is compliant."""
-    if now[c, HISTORY_STIFFNESS] > 0.0:
-        now[c, HISTORY_END_GAP] = gap
-        return gap + max(now[c, HISTORY_LAW_OVERLAP], 0.0)
+    if now.stiffness[c] > 0.0:
+        now.end_gap[c] = gap
+        return gap + max(now.law_overlap[c], 0.0)
     return gap
 
 
@@ -265,7 +234,7 @@ def remaining_gap(now, c, gap):
 def dissipated_energy(k, law, now, c, h, pressed):
     """Return the energy that the law dissipates in the step; all stored energy where the law would pull."""
     n, dissipation, damping, _, _ = law
-    a, b = now[c, HISTORY_OVERLAP], now[c, HISTORY_LAW_OVERLAP]
+    a, b = now.overlap[c], now.law_overlap[c]
     if dissipation == 0.0 and damping == 0.0:
         return 0.0
     if not pressed:
@@ -278,25 +247,23 @@ def dissipated_energy(k, law, now, c, h, pressed):
 
 
 @formula
-def store_elastic_energy(G, C, P, L, X, Y, pace, now):
+def store_elastic_energy(G, C, P, L, X, Y, state, now):
     """Update the elastic energy of contacts at the end of the step, and the energy dissipated or lost numerically."""
-    h = pace.real[STEP]
-    pace.real[STORED_ENERGY] = 0.0
-    for c in range(C.count[FOUND]):
-        if now[c, HISTORY_STIFFNESS] > 0.0:
-            k, n = now[c, HISTORY_STIFFNESS], contact_law(G, C, L, c)[0]
-            overlap = -now[c, HISTORY_END_GAP] - h * contact_velocity(P, Y.v, Y.wide, c)[0]
-            now[c, HISTORY_SPRING_OVERLAP] = elastic_overlap(
-                now[c, HISTORY_SHARE], overlap, now[c, HISTORY_LAW_OVERLAP]
-            )
-            after = elastic_energy(k, n, now[c, HISTORY_SPRING_OVERLAP])
-            pace.real[STORED_ENERGY] += after
+    h = state.times.step
+    state.sums.elastic_energy = 0.0
+    for c in range(C.count.found):
+        if now.stiffness[c] > 0.0:
+            k, n = now.stiffness[c], contact_law(G, C, L, c)[0]
+            overlap = -now.end_gap[c] - h * contact_velocity(P, Y.v, Y.wide, c)[0]
+            now.spring_overlap[c] = elastic_overlap(now.implicit_share[c], overlap, now.law_overlap[c])
+            after = elastic_energy(k, n, now.spring_overlap[c])
+            state.sums.elastic_energy += after
             lost = dissipated_energy(k, contact_law(G, C, L, c), now, c, h, X.p[c, 0] > 0.0)
-            pace.real[LOST_IMPACT] += lost
-            pace.real[NUMERICAL] -= after - elastic_energy(k, n, now[c, HISTORY_OVERLAP]) + lost
+            state.sums.impact_loss += lost
+            state.sums.numerical_loss -= after - elastic_energy(k, n, now.overlap[c]) + lost
 
 
 @formula
-def law_is_met(worst, residual, pace):
+def law_is_met(worst, residual, state):
     """Return whether rows agree with the law to the velocity tolerance, or to the residual of the solve."""
-    return worst <= max(LAW_TOLERANCE * pace.real[VELOCITY_TOLERANCE], RESIDUAL_SHARE * residual)
+    return worst <= max(LAW_TOLERANCE * state.tolerances.velocity, RESIDUAL_SHARE * residual)

@@ -14,7 +14,6 @@ the change of its rows. The same holds along the tangents of sliding contacts an
 
 from __future__ import annotations
 
-from ...collision.tables import APART, BEFORE, FEATURE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ...compiler.formulas import formula
 from ...math.scalar import cos, sin, sqrt
 from ...math.vec import (
@@ -43,46 +42,30 @@ from ...tables.table_definitions import ACROSS, KINETIC, ROLLING, SPINNING, STAT
 from .compliant_contact import contact_stiffness
 from .free_bodies import rest_speed, speed_of_fall
 from .stepping_tables import (
-    COMPLIANT,
-    GIVEN_BY_SURFACES,
-    HISTORY_IMPACT_IMPULSE,
-    HISTORY_IMPULSE,
-    HISTORY_MIDDLE_BIAS,
-    HISTORY_PERSISTS,
-    HISTORY_SLIDING,
-    HISTORY_START_VELOCITY,
-    HISTORY_STIFFNESS,
-    HISTORY_TORQUE,
-    LAST_RESIDUAL,
-    LOST_FRICTION,
-    LOST_IMPACT,
     MIDDLE_FOUND,
     MIDDLE_WANTED,
-    NUMERICAL,
     PRESSES,
-    STEP,
-    VELOCITY_TOLERANCE,
 )
 
 
 @formula
-def fill_rows(G, M, C, P, L, pace):
+def fill_rows(G, M, C, P, L, state):
     """Fill the contact problem except impulses and masses; its sizes too."""
-    h = pace.real[STEP]
-    P.size[0] = C.count[FOUND]
-    P.island[0], P.island[1] = 0, C.count[FOUND]
+    h = state.times.step
+    P.size[0] = C.count.found
+    P.island[0], P.island[1] = 0, C.count.found
     turns = P.turn.shape[0] > 0
-    for c in range(C.count[FOUND]):
-        i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+    for c in range(C.count.found):
+        i, j = C.at.shape_1[c], C.at.shape_2[c]
         a, b = P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
-        point = load3(C.x, c, POINT)
-        store3(P.frame, c, 0, load3(C.x, c, NORMAL))
-        apart = load3(C.x, c, APART)
+        point = load3(C.x.point, c, 0)
+        store3(P.frame, c, 0, load3(C.x.normal, c, 0))
+        apart = load3(C.x.apart, c, 0)
         store3(P.arm, c, 0, arm_to(M, a, sub(point, apart)))
         store3(P.arm, c, 3, arm_to(M, b, add(point, apart)))
-        law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+        law = L.pair[G.shape.material[i], G.shape.material[j]]
         fill_tangents(G, M, C, P, L, c)
-        gap = C.x[c, GAP]
+        gap = C.x.gap[c]
         P.bias[c, 0] = gap / h if gap > 0.0 else 0.0
         P.mu[c] = law[KINETIC]
         P.soft[c] = 0.0
@@ -93,7 +76,7 @@ def fill_rows(G, M, C, P, L, pace):
 @formula
 def movers_of_contact(G, C, c):
     """Return the movers of contact c."""
-    return G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+    return G.shape.mover[C.at.shape_1[c]], G.shape.mover[C.at.shape_2[c]]
 
 
 @formula
@@ -105,9 +88,9 @@ def arm_to(M, a, point):
 @formula
 def fill_tangents(G, M, C, P, L, c):
     """Set the tangents of contact c, and the velocities of moving surfaces along them."""
-    i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
-    a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
-    law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+    i, j = C.at.shape_1[c], C.at.shape_2[c]
+    a, b = G.shape.mover[i], G.shape.mover[j]
+    law = L.pair[G.shape.material[i], G.shape.material[j]]
     tangent, square = tangent_direction(M, L, (i, a), (j, b), load3(P.frame, c, 0))
     write_tangents(P.frame, c, tangent, law[ACROSS] if square else 1.0, law[ACROSS])
     P.bias[c, 1] = P.bias[c, 2] = 0.0
@@ -158,22 +141,22 @@ def add_surface_velocity(M, L, P, c, shape, mover, sign):
 @formula
 def warm_start(C, P, X, now, before):
     """Start from the impulses of the same contacts in the step before; note which contacts stuck."""
-    for c in range(C.count[FOUND]):
-        o = C.at[c, BEFORE]
-        now[c, HISTORY_SLIDING] = before[o, HISTORY_SLIDING] if o >= 0 else -1.0
-        store3(X.p, c, 0, previous_impulse(P, c, before, o, HISTORY_IMPULSE))
+    for c in range(C.count.found):
+        o = C.at.before[c]
+        now.sliding[c] = before.sliding[o] if o >= 0 else -1.0
+        store3(X.p, c, 0, previous_impulse(P, c, before.impulse, o))
         if X.torque.shape[0] > 0:
-            store3(X.torque, c, 0, previous_impulse(P, c, before, o, HISTORY_TORQUE))
+            store3(X.torque, c, 0, previous_impulse(P, c, before.torque, o))
 
 
 @formula
-def previous_impulse(P, c, before, o, first):
+def previous_impulse(P, c, stored, o):
     """Return the stored world vector of row o in the contact frame, the inverse of `to_world_frame`; 0 without row
     (-1).
     """
     if o < 0:
         return (0.0, 0.0, 0.0)
-    x = to_contact_frame(P, c, load3(before, o, first))
+    x = to_contact_frame(P, c, load3(stored, o, 0))
     n, s, t = load3(P.frame, c, 0), load3(P.frame, c, 3), load3(P.frame, c, 6)
     return (x[0] / dot(n, n), projection_coefficient(x[1], s), projection_coefficient(x[2], t))
 
@@ -186,15 +169,15 @@ def projection_coefficient(x, row):
 
 
 @formula
-def static_friction_of_sticking(G, C, P, L, X, pace, now):
+def static_friction_of_sticking(G, C, P, L, X, state, now):
     """Set the static coefficient for contacts that stuck before, and for new ones that hardly slide."""
-    slow = speed_of_fall(pace, pace.real[STEP])
-    for c in range(C.count[FOUND]):
-        law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
-        if law[STATIC] > law[KINETIC] and now[c, HISTORY_SLIDING] < 0.5:
+    slow = speed_of_fall(state, state.times.step)
+    for c in range(C.count.found):
+        law = L.pair[G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]]]
+        if law[STATIC] > law[KINETIC] and now.sliding[c] < 0.5:
             u = contact_velocity(P, X.v, X.wide, c)
             s, t = u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
-            if now[c, HISTORY_SLIDING] == 0.0 or s * s + t * t <= slow * slow:
+            if now.sliding[c] == 0.0 or s * s + t * t <= slow * slow:
                 P.mu[c] = law[STATIC]
 
 
@@ -210,7 +193,7 @@ NO_ARM = 1e-10  # negligible part of an arm across the normal, as for spheres
 @formula
 def side_of_contact(P, M, G, C, c, side):
     """Return the mover on a side of contact c, its arm, and the part of the arm across the normal (0 if negligible)."""
-    a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+    a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
     n, r = load3(P.frame, c, 0), load3(P.arm, c, 3 * side)
     s = sub(r, scale(dot(r, n), n))
     if dot(s, s) <= NO_ARM * NO_ARM * dot(r, r):
@@ -230,7 +213,7 @@ def rows_change(G, M, C, D, P, c, h):
     """Return whether the rows of contact c change within the step, by rotation of normals or of bodies with transverse
     arms.
     """
-    change = norm(sub(load3(C.x, c, NORMAL), load3(D.x, C.at[c, BEFORE], NORMAL)))
+    change = norm(sub(load3(C.x.normal, c, 0), load3(D.x.normal, C.at.before[c], 0)))
     for side in range(2):
         a, _, s = side_of_contact(P, M, G, C, c, side)
         if a >= 0 and dot(s, s) > 0.0:
@@ -271,7 +254,7 @@ def start_velocity(G, C, N, P, X, c):
     """Return the relative velocity of contact c at the start of the step, in world axes."""
     u = (0.0, 0.0, 0.0)
     for side in range(2):
-        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
         if a >= 0:
             v, w = start_twist(N, X, a)
             u = add(u, scale(2.0 * side - 1.0, add(v, cross(w, load3(P.arm, c, 3 * side)))))
@@ -287,26 +270,22 @@ def start_twist(N, X, a):
 
 
 @formula
-def speed_is_clear(G, C, N, P, X, c, pace):
+def speed_is_clear(G, C, N, P, X, c, state):
     """Return whether the bodies' speeds at contact c exceed the residual of the last solve."""
     fast, way = 0.0, (0.0, 0.0, 0.0)
     for side in range(2):
-        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        a = G.shape.mover[C.at.shape_1[c] if side == 0 else C.at.shape_2[c]]
         if a >= 0:
             v, w = start_twist(N, X, a)
             fast += norm(cross(w, load3(P.arm, c, 3 * side)))
             way = add(way, scale(2.0 * side - 1.0, v))
-    return fast + norm(way) > CLEAR_FACTOR * pace.real[LAST_RESIDUAL]
+    return fast + norm(way) > CLEAR_FACTOR * state.worst.last_residual
 
 
 @formula
 def had_impact(now, c):
     """Return whether contact c had an impact before the step."""
-    return (
-        now[c, HISTORY_IMPACT_IMPULSE] != 0.0
-        or now[c, HISTORY_IMPACT_IMPULSE + 1] != 0.0
-        or now[c, HISTORY_IMPACT_IMPULSE + 2] != 0.0
-    )
+    return now.impact_impulse[c, 0] != 0.0 or now.impact_impulse[c, 1] != 0.0 or now.impact_impulse[c, 2] != 0.0
 
 
 @formula
@@ -321,26 +300,28 @@ def was_in_impact(G, C, now, c, impacts):
 
 
 @formula
-def find_persistent_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts):
+def find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, impacts):
     """Find persistent contacts, and the relative velocities at the start. Returns whether rows in the middle are
     needed.
     """
-    h, wanted = pace.real[STEP], False
-    slow = rest_speed(pace, h)
-    for c in range(C.count[FOUND]):
-        o, u = C.at[c, BEFORE], start_velocity(G, C, N, P, X, c)
-        store3(now, c, HISTORY_MIDDLE_BIAS, (0.0, 0.0, 0.0))
-        store3(now, c, HISTORY_START_VELOCITY, u)
-        now[c, HISTORY_PERSISTS] = 0.0
-        if o < 0 or not before[o, HISTORY_SLIDING] >= 0.0:
+    h, wanted = state.times.step, False
+    slow = rest_speed(state, h)
+    for c in range(C.count.found):
+        o, u = C.at.before[c], start_velocity(G, C, N, P, X, c)
+        store3(now.middle_bias, c, 0, (0.0, 0.0, 0.0))
+        store3(now.start_velocity, c, 0, u)
+        now.persistence[c] = 0.0
+        if o < 0 or not before.sliding[o] >= 0.0:
             continue
-        soft = pace.count[COMPLIANT] != 0 and contact_stiffness(G, C, L, c) > 0.0
-        closing = -dot(load3(C.x, c, NORMAL), u)
-        if soft or closing <= pace.real[VELOCITY_TOLERANCE]:
-            now[c, HISTORY_PERSISTS] = PRESSES
-        steady = closing <= slow and not was_in_impact(G, C, now, c, impacts) and speed_is_clear(G, C, N, P, X, c, pace)
+        soft = state.options.compliant != 0 and contact_stiffness(G, C, L, c) > 0.0
+        closing = -dot(load3(C.x.normal, c, 0), u)
+        if soft or closing <= state.tolerances.velocity:
+            now.persistence[c] = PRESSES
+        steady = (
+            closing <= slow and not was_in_impact(G, C, now, c, impacts) and speed_is_clear(G, C, N, P, X, c, state)
+        )
         if not soft and steady and rows_change(G, M, C, D, P, c, h):
-            now[c, HISTORY_PERSISTS] = MIDDLE_WANTED
+            now.persistence[c] = MIDDLE_WANTED
             wanted = True
     return wanted
 
@@ -369,11 +350,11 @@ def restore_poses(N, M):
 def middle_rows(G, M, C, H, P, L, now):
     """Set the rows of persistent contacts from poses and contacts ``H`` in the middle; return whether there are any."""
     found = False
-    for k in range(H.count[FOUND]):
-        c = H.at[k, BEFORE]
-        if c < 0 or now[c, HISTORY_PERSISTS] != MIDDLE_WANTED or C.at[c, FEATURE] != H.at[k, FEATURE]:
+    for k in range(H.count.found):
+        c = H.at.before[k]
+        if c < 0 or now.persistence[c] != MIDDLE_WANTED or C.at.feature[c] != H.at.feature[k]:
             continue
-        n, point = load3(H.x, k, NORMAL), load3(H.x, k, POINT)
+        n, point = load3(H.x.normal, k, 0), load3(H.x.point, k, 0)
         a, b = movers_of_contact(G, C, c)
         r, s = arm_to(M, a, point), arm_to(M, b, point)
         if dot(n, load3(P.frame, c, 0)) < SAME_NORMAL or contact_jumps(M, P, c, (a, b), (r, s)):
@@ -384,7 +365,7 @@ def middle_rows(G, M, C, H, P, L, now):
         store3(P.arm, c, 0, r)
         store3(P.arm, c, 3, s)
         fill_tangents(G, M, C, P, L, c)
-        now[c, HISTORY_PERSISTS] = MIDDLE_FOUND
+        now.persistence[c] = MIDDLE_FOUND
         found = True
     return found
 
@@ -392,11 +373,11 @@ def middle_rows(G, M, C, H, P, L, now):
 @formula
 def bias_persistent_contacts(G, M, C, P, X, now, before):
     """Set the biases of contacts with rows in the middle of the step; see the module docstring."""
-    for c in range(C.count[FOUND]):
-        if now[c, HISTORY_PERSISTS] != MIDDLE_FOUND:
+    for c in range(C.count.found):
+        if now.persistence[c] != MIDDLE_FOUND:
             continue
         u = contact_velocity(P, X.v, X.wide, c)
-        first = to_contact_frame(P, c, load3(now, c, HISTORY_START_VELOCITY))
+        first = to_contact_frame(P, c, load3(now.start_velocity, c, 0))
         more = sub(u, first)
         mean = abs(first[0]) <= abs(more[0])
         ahead = (u[0] if mean else more[0], 0.0, 0.0)
@@ -404,14 +385,14 @@ def bias_persistent_contacts(G, M, C, P, X, now, before):
             s, t = more[1], more[2]
             own = P.bias[c, 1], P.bias[c, 2]
             a, b = first[1] + own[0], first[2] + own[1]
-            if before[C.at[c, BEFORE], HISTORY_SLIDING] == 0.0 and a * a + b * b <= s * s + t * t:
+            if before.sliding[C.at.before[c]] == 0.0 and a * a + b * b <= s * s + t * t:
                 s, t = u[1] + own[0], u[2] + own[1]
             ahead = (ahead[0], s, t)
-        store3(now, c, HISTORY_MIDDLE_BIAS, ahead)
+        store3(now.middle_bias, c, 0, ahead)
         if mean:  # its gap is closed by displacements
             P.bias[c, 0] = 0.0
         else:
-            now[c, HISTORY_PERSISTS] = MIDDLE_WANTED
+            now.persistence[c] = MIDDLE_WANTED
         store3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
 
 
@@ -419,7 +400,16 @@ CONE_TOLERANCE = 1e-9  # relative distance from the friction cone within which a
 
 
 @formula
-def account_contact(P, X, c, u, pace, now):
+def add_loss(state, numerical, lost):
+    """Account for lost energy: as a numerical error, or as lost in impacts."""
+    if numerical:
+        state.sums.numerical_loss += lost
+    else:
+        state.sums.impact_loss += lost
+
+
+@formula
+def account_contact(P, X, c, u, state, now):
     """Store the impulse of contact c for the next step, and account for its work at the mean velocities u of the step.
 
     For a persistent contact, work along the normal is a numerical error, and so is work along its tangents if it sticks
@@ -427,29 +417,33 @@ def account_contact(P, X, c, u, pace, now):
     it is exact.
     """
     n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
-    store3(now, c, HISTORY_IMPULSE, to_world_frame(P, c, n, s, t))
+    store3(now.impulse, c, 0, to_world_frame(P, c, n, s, t))
     if n > 0.0:
-        belt = (P.bias[c, 1] - now[c, HISTORY_MIDDLE_BIAS + 1]) * s + (
-            P.bias[c, 2] - now[c, HISTORY_MIDDLE_BIAS + 2]
-        ) * t
-        other = NUMERICAL if now[c, HISTORY_PERSISTS] > 0.0 or now[c, HISTORY_STIFFNESS] > 0.0 else LOST_IMPACT
+        belt = (P.bias[c, 1] - now.middle_bias[c, 1]) * s + (P.bias[c, 2] - now.middle_bias[c, 2]) * t
+        numerical = now.persistence[c] > 0.0 or now.stiffness[c] > 0.0
         slides = sqrt(s * s + t * t) >= (1.0 - CONE_TOLERANCE) * P.mu[c] * n
         worn = -(s * u[1] + t * u[2] + belt)
-        sticks = now[c, HISTORY_PERSISTS] > 0.0 and now[c, HISTORY_SLIDING] == 0.0 and not slides
-        pace.real[other] -= n * u[0]
-        pace.real[other if sticks or worn < 0.0 else LOST_FRICTION] += worn
-        pace.real[GIVEN_BY_SURFACES] -= belt
-        now[c, HISTORY_SLIDING] = 1.0 if slides else 0.0
+        sticks = now.persistence[c] > 0.0 and now.sliding[c] == 0.0 and not slides
+        add_loss(state, numerical, -(n * u[0]))
+        if sticks or worn < 0.0:
+            add_loss(state, numerical, worn)
+        else:
+            state.sums.friction_loss += worn
+        state.sums.surface_work -= belt
+        now.sliding[c] = 1.0 if slides else 0.0
     else:
-        now[c, HISTORY_SLIDING] = -1.0
+        now.sliding[c] = -1.0
 
 
 @formula
-def account_rolling(P, X, Y, c, pace, now):
+def account_rolling(P, X, Y, c, state, now):
     """Store the impulse of rolling and spinning friction at contact c, and account for its work at mean velocities
     ``Y``.
     """
     t = load3(X.torque, c, 0)
-    store3(now, c, HISTORY_TORQUE, to_world_frame(P, c, t[0], t[1], t[2]))
+    store3(now.torque, c, 0, to_world_frame(P, c, t[0], t[1], t[2]))
     worn = -dot(t, contact_angular_velocity(P, Y.v, Y.wide, c))
-    pace.real[LOST_FRICTION if worn >= 0.0 else NUMERICAL] += worn
+    if worn >= 0.0:
+        state.sums.friction_loss += worn
+    else:
+        state.sums.numerical_loss += worn

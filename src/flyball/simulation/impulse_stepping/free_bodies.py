@@ -25,19 +25,6 @@ from ...math.vec import (
     symmetric,
 )
 from ...numerics.complementarity.contact_operator import set_symmetric_block, symmetric_block
-from ...numerics.complementarity.contact_problem import INVERSE_INERTIA
-from .stepping_tables import (
-    ANGLE,
-    FREE_INERTIA,
-    FREE_INVERSE,
-    FREE_MASS,
-    FREE_PER_MASS,
-    FREE_ROUND,
-    GRAVITY,
-    NO_BOUNCE_BELOW,
-    NUMERICAL,
-    STEP,
-)
 
 SPIN_ITERATIONS = 20  # Newton iterations for half a step of rotation; three or four are usual
 SPIN_TOLERANCE = 1e-15  # relative change of the angular momentum that is rounding
@@ -104,10 +91,10 @@ def newton_column(inverse, m, w, h, d):
 
 
 @formula
-def inverse_in_world(R, J, k, node):
+def inverse_in_world(R, inverse, k, node):
     """Write the inverse inertia in world axes, R J^-1 R', into a node of the cone problem."""
-    xx, xy, xz, yy, yz, zz = symmetric_block(J, k, FREE_INVERSE)
-    set_symmetric_block(node, k, INVERSE_INERTIA, turned_inertia(R, (xx, xy, xz, xy, yy, yz, xz, yz, zz)))
+    xx, xy, xz, yy, yz, zz = symmetric_block(inverse, k, 0)
+    set_symmetric_block(node.inverse_inertia, k, 0, turned_inertia(R, (xx, xy, xz, xy, yy, yz, xz, yz, zz)))
 
 
 def rotation_matrices(turn: np.ndarray) -> np.ndarray:
@@ -120,29 +107,29 @@ REST_FACTOR = 2.0  # closing speed of a resting contact, relative to the speed b
 
 
 @formula
-def speed_of_fall(pace, h):
+def speed_of_fall(state, h):
     """Return the speed that gravity causes in h seconds."""
-    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
+    g0, g1, g2 = state.gravity[0], state.gravity[1], state.gravity[2]
     return h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
 
 
 @formula
-def rest_speed(pace, h):
+def rest_speed(state, h):
     """Return the closing speed up to which a contact rests, rather than having an impact, in steps of h seconds."""
-    return max(pace.real[NO_BOUNCE_BELOW], REST_FACTOR * speed_of_fall(pace, h))
+    return max(state.tolerances.rebound_speed, REST_FACTOR * speed_of_fall(state, h))
 
 
 @formula
-def velocities_without_contact(N, M, P, X, pace):
+def velocities_without_contact(N, M, P, X, state):
     """Compute the velocities without contact in ``M.twist``, and the masses of the nodes; ``X.v`` keeps the start."""
-    h = pace.real[STEP]
+    h = state.times.step
     for k in range(N.body.shape[0]):
         for i in range(3):
-            M.twist[k, i] = X.v[k, i] + (h * pace.real[GRAVITY + i] if N.body[k, FREE_PER_MASS] > 0.0 else 0.0)
+            M.twist[k, i] = X.v[k, i] + (h * state.gravity[i] if N.body.inverse_mass[k] > 0.0 else 0.0)
             M.twist[k, 3 + i] = X.v[k, 3 + i]
-        P.node[k, 0] = N.body[k, FREE_PER_MASS]
-        if N.body[k, FREE_ROUND] == 0.0:
-            inverse_in_world(load9(M.pose, k, 3), N.body, k, P.node)
+        P.node.inverse_mass[k] = N.body.inverse_mass[k]
+        if N.body.isotropic[k] == 0.0:
+            inverse_in_world(load9(M.pose, k, 3), N.body.inverse_inertia, k, P.node)
 
 
 @formula
@@ -174,31 +161,31 @@ def clear_velocities(Y):
 
 
 @formula
-def displace_bodies(N, M, X, displacements, pace):
+def displace_bodies(N, M, X, displacements, state):
     """Compute positions and orientations at the end of the step.
 
     Bodies move with the velocities at the end and the additional displacements: x += h v + h d, where d is ``N.move``
     plus ``displacements``. Rotation by v conserves energy and angular momentum. The rotation d also rotates the
     velocities, so that it changes no energy. The change of gravity's energy by displacements is accounted as numerical.
     """
-    h = pace.real[STEP]
+    h = state.times.step
     for k in range(N.body.shape[0]):
         for i in range(3):
-            pace.real[NUMERICAL] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * displacements[k, i]
+            state.sums.numerical_loss += h * N.body.mass[k] * state.gravity[i] * displacements[k, i]
             M.pose[k, i] += h * (X.v[k, i] + N.move[k, i] + displacements[k, i])
         w, d = load3(X.v, k, 3), add(load3(N.move, k, 3), load3(displacements, k, 3))
         if dot(w, w) + dot(d, d) < NO_SPIN:
             continue
         q = (N.turn[k, 0], N.turn[k, 1], N.turn[k, 2], N.turn[k, 3])
-        if N.body[k, FREE_ROUND] > 0.0:
+        if N.body.isotropic[k] > 0.0:
             w = add(w, d)
             if dot(w, w) < NO_SPIN:
                 continue
             q = turned_by_angle(q, w, h)
-            N.move[k, ANGLE] += h * w[2]
+            N.angle[k] += h * w[2]
         else:
-            R, inverse = load9(M.pose, k, 3), symmetric_block(N.body, k, FREE_INVERSE)
-            mean, p = mean_spin(inverse, symmetric(symmetric_block(N.body, k, FREE_INERTIA), mtv(R, w)), h)
+            R, inverse = load9(M.pose, k, 3), symmetric_block(N.body.inverse_inertia, k, 0)
+            mean, p = mean_spin(inverse, symmetric(symmetric_block(N.body.inertia, k, 0), mtv(R, w)), h)
             q = turned_by_cayley(turned_by_cayley(q, mv(R, mean), h), d, h)
             store3(X.v, k, 3, mv(quaternion_matrix(q[0], q[1], q[2], q[3]), symmetric(inverse, p)))
         N.turn[k, 0], N.turn[k, 1], N.turn[k, 2], N.turn[k, 3] = q

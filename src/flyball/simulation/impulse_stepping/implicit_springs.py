@@ -25,20 +25,7 @@ from ...engine.solve import apply_inverse_mass
 from ...math.rotation import rotation_vector
 from ...math.scalar import sqrt
 from ...math.vec import col, dot, mm, norm, sub, transpose
-from ...tables.table_definitions import BIAS, SCHUR, VALUE
-from .stepping_tables import (
-    SPRING_ADDED_MASS,
-    SPRING_BIAS,
-    SPRING_C,
-    SPRING_DIRECTION,
-    SPRING_DIRECTIONS,
-    SPRING_FORCE,
-    SPRING_K,
-    SPRING_LENGTH,
-    SPRING_SHARE,
-    SPRING_SOLUTION,
-    STEP_DISPLACEMENT,
-)
+from ...tables.table_definitions import SCHUR
 
 SOFT_SPRING = 1e-3  # h^2 k / m + h c / m below which a spring is evaluated explicitly at half the step
 
@@ -84,7 +71,7 @@ def dot_rows(a, b):
 @formula
 def impulse_response(A, force, out):
     """Compute the change of velocities by generalised impulses with closed joints, without implicit springs."""
-    nv, nr = A.wide.shape[1], A.S.rows.law.shape[0]
+    nv, nr = A.velocities.before.shape[0], A.S.rows.law.shape[0]
     rows = A.output.rows
     for d in range(nv):
         rows[0, d] = force[d]
@@ -110,8 +97,8 @@ def find_implicit_springs(A, h):
         for i in range(n):
             stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
             if stiffness + damping > 0.0 and add_spring(A, h, used, (k, n, i), stiffness, damping):
-                A.spring_x[used, SPRING_FORCE] = k
-                A.spring_x[used, SPRING_DIRECTIONS], A.spring_x[used, SPRING_DIRECTION] = n, i
+                A.springs.force[used] = k
+                A.springs.directions[used], A.springs.direction[used] = n, i
                 used += 1
     A.count.springs = used
     factor_springs(A)
@@ -120,7 +107,7 @@ def find_implicit_springs(A, h):
 @formula
 def add_spring(A, h, n, which, stiffness, damping):
     """Write a spring into row n of the tables. Returns whether it is stiff enough to be kept."""
-    J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
+    J, Y, x = A.spring_J[n], A.spring_Y[n], A.springs
     spring_gradient(A.S, A.W, which[0], which[1], which[2], J)
     z = h * (h * stiffness + damping)
     if A.S.sizes.solver == SCHUR:  # joints never increase the response
@@ -134,8 +121,8 @@ def add_spring(A, h, n, which, stiffness, damping):
         return False
     y = (0.25 * z) * (0.25 * z)
     share = y / (1.0 + y)
-    x[SPRING_K], x[SPRING_C], x[SPRING_SHARE] = stiffness, damping, share
-    x[SPRING_ADDED_MASS] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
+    x.stiffness[n], x.damping[n], x.implicit_share[n] = stiffness, damping, share
+    x.added_mass[n] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
     return True
 
 
@@ -147,7 +134,7 @@ def factor_springs(A):
         for j in range(i + 1):
             s = dot_rows(A.spring_J[i], A.spring_Y[j])
             if i == j:
-                s += 1.0 / A.spring_x[i, SPRING_ADDED_MASS]
+                s += 1.0 / A.springs.added_mass[i]
             for k in range(j):
                 s -= C[i, k] * C[j, k]
             C[i, j] = sqrt(s) if i == j else s / C[j, j]
@@ -156,38 +143,38 @@ def factor_springs(A):
 @formula
 def with_spring_response(A, x):
     """Change a response without springs to one with them, in place."""
-    n, t = A.count.springs, A.spring_x
+    n, t = A.count.springs, A.springs
     for i in range(n):
-        t[i, SPRING_SOLUTION] = dot_rows(A.spring_J[i], x)
+        t.solution[i] = dot_rows(A.spring_J[i], x)
     solve_springs(A)
     for i in range(n):
         for d in range(x.shape[0]):
-            x[d] -= t[i, SPRING_SOLUTION] * A.spring_Y[i, d]
+            x[d] -= t.solution[i] * A.spring_Y[i, d]
 
 
 @formula
 def solve_springs(A):
     """Solve with the Cholesky factor, in place."""
-    n, C, t = A.count.springs, A.stiff, A.spring_x
+    n, C, t = A.count.springs, A.stiff, A.springs
     for i in range(n):
-        s = t[i, SPRING_SOLUTION]
+        s = t.solution[i]
         for k in range(i):
-            s -= C[i, k] * t[k, SPRING_SOLUTION]
-        t[i, SPRING_SOLUTION] = s / C[i, i]
+            s -= C[i, k] * t.solution[k]
+        t.solution[i] = s / C[i, i]
     for i in range(n - 1, -1, -1):
-        s = t[i, SPRING_SOLUTION]
+        s = t.solution[i]
         for k in range(i + 1, n):
-            s -= C[k, i] * t[k, SPRING_SOLUTION]
-        t[i, SPRING_SOLUTION] = s / C[i, i]
+            s -= C[k, i] * t.solution[k]
+        t.solution[i] = s / C[i, i]
 
 
 @formula
 def spring_impulse(A, h, i, before, change):
     """Return the impulse of spring i beyond that of the force at half the step, for this change of velocities."""
-    x = A.spring_x[i]
-    b, bend = x[SPRING_SHARE], h * x[SPRING_BIAS]
+    x = A.springs
+    b, bend = x.implicit_share[i], h * x.bias[i]
     r, dr = dot_rows(A.spring_J[i], before) - 0.5 * bend, dot_rows(A.spring_J[i], change) + bend
-    return h * h * x[SPRING_K] * (b * (r - 0.125 * bend) + (0.25 + 0.75 * b) * dr) + 0.5 * h * x[SPRING_C] * b * dr
+    return h * h * x.stiffness[i] * (b * (r - 0.125 * bend) + (0.25 + 0.75 * b) * dr) + 0.5 * h * x.damping[i] * b * dr
 
 
 LENGTH_ITERATIONS = 3
@@ -199,7 +186,7 @@ LENGTH_TOLERANCE = 1e-12  # negligible change of a spring's length, relative to 
 def force_length(S, W, k, n, i):
     """Return the length of force k along its direction i of n, at the kinematics in W."""
     if S.forces.family[k] == 1:
-        return W.sensed[VALUE, S.forces.F[k]]
+        return W.sensed.value[S.forces.F[k]]
     F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
     line = sub(M[0], F[0])
     if n == 1:
@@ -212,21 +199,21 @@ def force_length(S, W, k, n, i):
 @formula
 def spring_length(A, i):
     """`force_length` of spring i of the step."""
-    x = A.spring_x[i]
-    return force_length(A.S, A.W, int(x[SPRING_FORCE]), int(x[SPRING_DIRECTIONS]), int(x[SPRING_DIRECTION]))
+    x = A.springs
+    return force_length(A.S, A.W, int(x.force[i]), int(x.directions[i]), int(x.direction[i]))
 
 
 @formula
 def save_spring_biases(A):
     """Store the bias accelerations of the springs' lengths."""
     for i in range(A.count.springs):
-        x = A.spring_x[i]
-        k = int(x[SPRING_FORCE])
-        x[SPRING_BIAS] = 0.0
+        x = A.springs
+        k = int(x.force[i])
+        x.bias[i] = 0.0
         if A.S.forces.family[k] == 1:
-            x[SPRING_BIAS] = A.W.sensed[BIAS, A.S.forces.F[k]]
-        elif x[SPRING_DIRECTIONS] < 2.0:
-            x[SPRING_BIAS] = distance_bias(load_record(A.W.FK, A.S.forces.F[k]), load_record(A.W.FK, A.S.forces.M[k]))
+            x.bias[i] = A.W.sensed.bias[A.S.forces.F[k]]
+        elif x.directions[i] < 2.0:
+            x.bias[i] = distance_bias(load_record(A.W.FK, A.S.forces.F[k]), load_record(A.W.FK, A.S.forces.M[k]))
 
 
 @formula
@@ -244,7 +231,7 @@ def distance_bias(F, M):
 def save_spring_lengths(A):
     """Store the lengths of the springs at half the step."""
     for i in range(A.count.springs):
-        A.spring_x[i, SPRING_LENGTH] = spring_length(A, i)
+        A.springs.length[i] = spring_length(A, i)
 
 
 @formula
@@ -252,22 +239,20 @@ def correct_spring_lengths(A):
     """Correct the positions at the end of the step, so that spring lengths agree with their linearised values."""
     stiff = False
     for i in range(A.count.springs):
-        stiff = stiff or A.spring_x[i, SPRING_SHARE] > STIFF_SHARE
+        stiff = stiff or A.springs.implicit_share[i] > STIFF_SHARE
     if not stiff:
         return
     h = A.real.step
-    q = A.clock.y[0, : A.S.sizes.coordinates]
+    q = A.clock.y.current[: A.S.sizes.coordinates]
     step = A.mixing[0]
     for _ in range(LENGTH_ITERATIONS):
         call(A.door[0], A.S, A.W, A.R, A.clock, A.output, POSITION)
         worst = 0.0
         for i in range(A.count.springs):
-            x = A.spring_x[i]
-            told = (
-                x[SPRING_LENGTH] + dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT]) + 0.125 * h * h * x[SPRING_BIAS]
-            )
-            x[SPRING_SOLUTION] = spring_length(A, i) - told
-            worst = max(worst, abs(x[SPRING_SOLUTION]) / (1.0 + abs(told)))
+            x = A.springs
+            told = x.length[i] + dot_rows(A.spring_J[i], A.velocities.displacement) + 0.125 * h * h * x.bias[i]
+            x.solution[i] = spring_length(A, i) - told
+            worst = max(worst, abs(x.solution[i]) / (1.0 + abs(told)))
         if not LENGTH_TOLERANCE < worst < 1.0:
             return
         solve_springs(A)
@@ -275,5 +260,5 @@ def correct_spring_lengths(A):
             step[d] = 0.0
         for i in range(A.count.springs):
             for d in range(step.shape[0]):
-                step[d] -= A.spring_x[i, SPRING_SOLUTION] * A.spring_Y[i, d]
+                step[d] -= A.springs.solution[i] * A.spring_Y[i, d]
         retract(A.S, q, step)

@@ -14,7 +14,6 @@ import numpy as np
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ...assembly.positions_and_velocities import described_velocities
-from ...collision.tables import FOUND, GAP, MOVER, SHAPE_1, SHAPE_2
 from ...compiler.object_code import compiled_since
 from ...errors import AnalysisError, SimulationError
 from ...math.vec import mtv, quaternion_matrix
@@ -50,33 +49,8 @@ from .setup import (
 from .step_loop import solver_counts
 from .stepper import NoSolution, Stepper
 from .stepping_tables import (
-    ANGLE,
-    ENDLESS_IMPACTS,
-    GIVEN_BY_SURFACES,
-    HISTORY_IMPACT_IMPULSE,
-    HISTORY_IMPULSE,
-    HISTORY_SLIDING,
-    IMPACTS,
-    ITERATIONS,
-    LOST_FRICTION,
-    LOST_IMPACT,
-    MOST_CONTACTS,
-    NUMERICAL,
-    OVERLAP_AT_START,
-    REDUCED_EXPANSIONS,
-    STEP,
-    STEPS_TAKEN,
-    STORED_AT_START,
-    STORED_ENERGY,
-    TIME,
-    UNCONVERGED,
-    WORST_AT,
-    WORST_FORCE,
-    WORST_OVERLAP,
-    WORST_RESIDUAL,
+    RunSums,
 )
-
-ENERGY_SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN_BY_SURFACES, NUMERICAL, STORED_ENERGY)
 
 
 class OutputRecorder:
@@ -101,20 +75,20 @@ class OutputRecorder:
         self.acceleration: list[
             np.ndarray
         ] = []  # mean over the step that ends at the time; at the start over the first step
-        self.sums: list[np.ndarray] = []
+        self.sums: list[RunSums] = []
         self.contacts: list[dict[str, np.ndarray]] = []
 
     def add(self, moved: bool) -> None:
         """Record the present state, and the contacts of the last step if there was one."""
         s = self.stepper
-        self.t.append(float(s.pace.real[TIME]))
+        self.t.append(float(s.state.times.now))
         self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
         self.turn.append(s.free.turn.copy())
-        self.angle.append(s.free.move[:, ANGLE].copy())
+        self.angle.append(s.free.angle.copy())
         self.twist.append(s.workspaces.X.v[:, :6].copy())
-        sums = s.pace.real[list(ENERGY_SUMS)]
-        sums[ENERGY_SUMS.index(LOST_IMPACT)] += s.joints.real.lost
-        sums[ENERGY_SUMS.index(NUMERICAL)] += s.joints.real.astray
+        sums = s.state.sums.copy()
+        sums.impact_loss += s.joints.real.lost
+        sums.numerical_loss += s.joints.real.astray
         self.sums.append(sums)
         if self.held:
             self.held.add(s.joints, moved)
@@ -124,13 +98,13 @@ class OutputRecorder:
 
     def first(self) -> None:
         """Record the mean accelerations of the first step for the start, and the energy stored there."""
-        self.sums[0][ENERGY_SUMS.index(STORED_ENERGY)] = self.stepper.pace.real[STORED_AT_START]
+        self.sums[0].elastic_energy = self.stepper.state.sums.elastic_at_start
         self.begin()
 
     def begin(self) -> None:
         """Record the mean accelerations of the last step."""
         s = self.stepper
-        self.acceleration.append((s.workspaces.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
+        self.acceleration.append((s.workspaces.X.v[:, :6] - s.free.before) / s.state.times.step)
 
     def _active_contacts(self) -> dict[str, np.ndarray]:
         """Return the contacts with a force, and their normals, which are those of the middle of the step.
@@ -140,24 +114,19 @@ class OutputRecorder:
         """
         s = self.stepper
         C, kept = s.last()
-        n = int(C.count[FOUND])
-        impulse = (
-            kept[:n, HISTORY_IMPULSE : HISTORY_IMPULSE + 3]
-            + kept[:n, HISTORY_IMPACT_IMPULSE : HISTORY_IMPACT_IMPULSE + 3]
-        )
+        n = int(C.count.found)
+        impulse = kept.impulse[:n] + kept.impact_impulse[:n]
         k = np.flatnonzero((impulse != 0.0).any(axis=1))
-        mover = s.geometry.shape_i[C.at[k][:, [SHAPE_1, SHAPE_2]], MOVER]
+        mover = s.geometry.shape.mover[C.at[k, :2]]
         moving = (mover >= 0)[:, :, None]
         points = np.where(moving, s.free.start[mover, :3] + s.workspaces.P.arm[k].reshape(-1, 2, 3), 0.0)
         return {
             "pair": self.side_of[mover],
             "point": points.sum(axis=1) / np.maximum(moving.sum(axis=1), 1),
             "normal": s.workspaces.P.frame[k, :3].copy(),
-            "gap": C.x[k, GAP],
-            "force": impulse[k] / s.pace.real[STEP],
-            "state": np.where(
-                kept[k, HISTORY_SLIDING] > 0.5, SLIP, np.where(kept[k, HISTORY_SLIDING] < -0.5, OPEN, STICK)
-            ),
+            "gap": C.x.gap[k],
+            "force": impulse[k] / s.state.times.step,
+            "state": np.where(kept.sliding[k] > 0.5, SLIP, np.where(kept.sliding[k] < -0.5, OPEN, STICK)),
             "friction": s.workspaces.P.mu[k],
         }
 
@@ -247,16 +216,16 @@ def make_impulse_result(
     values, model = base.compiled.values, base.compiled.structure.model
     q, v, vdot = free_coordinates(base, scene, recorder)
     t = np.array(recorder.t)
-    count = stepper.pace.count
+    counts = stepper.state.counts
     contact = _contact_health(scene, stepper, o, smallest_radius(scene, values))
     health = Health(
         success=message == END_MESSAGE,
         message=message,
         violation=0.0,
         velocity_violation=0.0,
-        steps=int(count[STEPS_TAKEN]),
+        steps=int(counts.steps_taken),
         rejected=0,
-        evaluations=int(count[ITERATIONS]),
+        evaluations=int(counts.iterations),
         factorisations=0,
         seconds=time.perf_counter() - since,
         compiling=compiled_since(since),
@@ -274,7 +243,7 @@ def make_impulse_result(
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.final = (float(t[-1]), np.concatenate([q[-1], v[-1], states[-1]]))
     sums = np.array(recorder.sums)
-    result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T, strict=True))
+    result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T[:-1], strict=True))
     result.contacts = recorder.as_contacts(contact_bodies, model.planar)
     result.bulk = body_sets(model, scene, recorder)
     result.record = record_motion(result, accelerations=False)
@@ -294,25 +263,25 @@ def _solvers_in_words(stepper: Stepper, solver: str) -> str:
 
 
 def _contact_health(scene: ContactTables, stepper: Stepper, o: Stepping, size: float) -> ContactHealth:
-    real, count = stepper.pace.real, stepper.pace.count
+    worst, counts = stepper.state.worst, stepper.state.counts
     return ContactHealth(
         solver=_solvers_in_words(stepper, o.solver),
-        impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
-        most=int(count[MOST_CONTACTS]),
-        worst_overlap=max(0.0, -float(real[WORST_OVERLAP])),
-        overlap_at_start=max(0.0, -float(real[OVERLAP_AT_START])),
-        residual=float(real[WORST_RESIDUAL]),
-        force_residual=float(real[WORST_FORCE]),
+        impacts=f"{o.restitution.title()}, {o.impacts}" if counts.impacts else "",
+        most=int(counts.most_contacts),
+        worst_overlap=max(0.0, -float(worst.overlap)),
+        overlap_at_start=max(0.0, -float(worst.overlap_at_start)),
+        residual=float(worst.residual),
+        force_residual=float(worst.force_residual),
         tolerance=o.tolerance,
-        solves=int(count[STEPS_TAKEN]),
-        iterations=int(count[ITERATIONS]),
-        unconverged=int(count[UNCONVERGED]),
-        worst_at=float(real[WORST_AT]),
+        solves=int(counts.steps_taken),
+        iterations=int(counts.iterations),
+        unconverged=int(counts.unconverged),
+        worst_at=float(worst.time),
         size=size,
         halved=int(stepper.halved),
-        reduced=int(count[REDUCED_EXPANSIONS]),
-        impacted=int(count[IMPACTS]),
-        endless=int(count[ENDLESS_IMPACTS]),
+        reduced=int(counts.reduced_expansions),
+        impacted=int(counts.impacts),
+        endless=int(counts.endless_impacts),
     )
 
 
@@ -371,11 +340,11 @@ def simulate_by_impulses(
         interrupted = step_to_outputs(stepper, span, times, o, kept, report, part)
     except NoSolution:
         result = with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, ""), before, part)
-        t = float(stepper.pace.real[TIME])
+        t = float(stepper.state.times.now)
         result.health.message = f"{model.name!r} cannot continue at t = {t:.6g} s: {NO_WAY_MESSAGE}"
         raise SimulationError(result.health.message, result, t) from None
     message = INTERRUPTED_MESSAGE if interrupted else PAUSED_MESSAGE if part.paused else END_MESSAGE
-    message = message.format(float(stepper.pace.real[TIME]))
+    message = message.format(float(stepper.state.times.now))
     return with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, message), before, part)
 
 
@@ -398,13 +367,13 @@ def step_to_outputs(
     At the end of the segment there is always an output row.
     """
     first, last = span
-    real, each = stepper.pace.real, 1
-    real[TIME] = first
+    times_of_run, each = stepper.state.times, 1
+    times_of_run.now = first
     if len(times) and times[0] == first:
         recorder.add(False)
     try:
         for t in (*times[times > first].tolist(), last):
-            way = t - float(real[TIME])
+            way = t - float(times_of_run.now)
             steps = math.ceil(way / o.longest * (1.0 - 1e-9) - 1e-12)
             if steps > 0:
                 stepper.run(1, way / steps)
@@ -420,11 +389,11 @@ def step_to_outputs(
                         1, min(MOST_STEPS_PER_CALL, int(n * CALL_SECONDS / max(time.perf_counter() - began, 1e-9)))
                     )
                     left -= n
-                    report((float(real[TIME]) - first) / (last - first))
+                    report((float(times_of_run.now) - first) / (last - first))
                 if left:
                     recorder.add(True)
                     return False
-            real[TIME] = t
+            times_of_run.now = t
             if len(recorder.t) < len(times):
                 recorder.add(True)
             report((t - first) / (last - first))

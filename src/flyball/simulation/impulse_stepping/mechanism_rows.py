@@ -13,37 +13,13 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
 from ...math.vec import add, load3
-from ...numerics.complementarity.contact_problem import FIXED_SIDE, LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
-from ...tables.table_definitions import BIAS as BEND_OF
-from ...tables.table_definitions import RETURNED, VALUE
+from ...numerics.complementarity.contact_problem import FIXED_SIDE
 from .implicit_springs import add_wrench_power, impulse_response, with_spring_response
 from .stepping_tables import (
-    FRICTION_LOAD,
-    GENERALISED_IMPULSE,
-    JOB_AT,
-    JOB_NEXT,
-    JOB_ROWS,
-    LINE_AT,
-    LINE_FORCE,
     LINE_FRICTION,
-    LINE_GROUP,
-    LINE_KIND,
-    LINE_LOWER,
-    LINE_OF,
-    LINE_QUANTITY,
-    LINE_REACTION,
-    LINE_RESTITUTION,
     LINE_ROPE,
     LINE_STOP,
-    LINE_UPPER,
-    ROPE_C,
-    ROPE_K,
-    ROPE_LENGTH,
     TABLES_FULL,
-    V_AFTER,
-    V_BEFORE,
-    V_CHANGE,
-    V_IMPULSIVE,
 )
 
 REST_SHARE = 1e-9  # negligible rate, relative to the deceleration by friction within a step
@@ -54,7 +30,7 @@ INFINITE = 1e300
 @formula
 def line_group(A, k):
     """Return the group of the quantity of single row k; -1 if nothing moves it."""
-    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    r = A.S.rows.law.shape[0] + A.line.quantity[k]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         for g in range(A.queue.shape[0]):
             if A.group[g] <= A.S.column[e] < A.group[g + 1]:
@@ -66,7 +42,7 @@ def line_group(A, k):
 def line_rate(A, k, v):
     """Return the rate of the quantity of single row k at velocities v."""
     s = 0.0
-    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    r = A.S.rows.law.shape[0] + A.line.quantity[k]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         s += A.W.G[e] * v[A.S.column[e]]
     return s
@@ -75,8 +51,8 @@ def line_rate(A, k, v):
 @formula
 def stop_gap(A, k, side):
     """Return the gap of a stop at the start of the step; side 1 is the lower stop, -1 the upper."""
-    x = A.W.sensed[VALUE, A.line[k, LINE_QUANTITY]] - 0.5 * A.real.step * line_rate(A, k, A.wide[V_BEFORE])
-    return x - A.line_x[k, LINE_LOWER] if side > 0 else A.line_x[k, LINE_UPPER] - x
+    x = A.W.sensed.value[A.line.quantity[k]] - 0.5 * A.real.step * line_rate(A, k, A.velocities.before)
+    return x - A.line_law.lower[k] if side > 0 else A.line_law.upper[k] - x
 
 
 @formula
@@ -84,9 +60,9 @@ def line_acts(A, k, side):
     """Return whether single row k acts in this step; of two stops the nearer one always does, since impacts may reach
     it.
     """
-    if A.line[k, LINE_KIND] != LINE_STOP:
+    if A.line.kind[k] != LINE_STOP:
         return side > 0
-    r, dr = line_rate(A, k, A.wide[V_BEFORE]), line_rate(A, k, A.wide[V_CHANGE])
+    r, dr = line_rate(A, k, A.velocities.before), line_rate(A, k, A.velocities.change)
     if stop_gap(A, k, side) < stop_gap(A, k, -side):
         return True
     return stop_gap(A, k, side) < STOP_LOOKAHEAD * A.real.step * (abs(r) + abs(dr)) + 1e-9
@@ -106,7 +82,7 @@ def line_rows(A, P, used, jobs, write):
                 continue
             size = A.group[g + 1] - A.group[g]
             if write:
-                A.active[n, LINE_OF], A.active[n, LINE_GROUP], A.active[n, LINE_AT] = side * (k + 1), g, used
+                A.active.line[n], A.active.group[n], A.active.first[n] = side * (k + 1), g, used
                 line_row(A, P, k, g, (used, size, side))
             used += size
             jobs += 1
@@ -120,7 +96,7 @@ def line_row(A, P, k, g, where):
     at, size, side = where
     for d in range(size):
         P.J[at + d] = 0.0
-    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    r = A.S.rows.law.shape[0] + A.line.quantity[k]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         P.J[at + A.S.column[e] - A.group[g]] += side * A.W.G[e]
 
@@ -131,17 +107,17 @@ def line_laws(A, P, n):
     h = A.real.step
     P.size[3] = n
     for i in range(n):
-        k = abs(A.active[i, LINE_OF]) - 1
-        side = 1 if A.active[i, LINE_OF] > 0 else -1
-        x = P.line_x[i]
-        P.line_at[i, 0], P.line_at[i, 1] = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
-        x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.0, 0.0, 0.0, INFINITE
-        rate = side * line_rate(A, k, A.wide[V_BEFORE])
-        if A.line[k, LINE_KIND] == LINE_STOP:
+        k = abs(A.active.line[i]) - 1
+        side = 1 if A.active.line[i] > 0 else -1
+        x = P.line_law
+        P.line_at[i, 0], P.line_at[i, 1] = A.active.group[i], A.active.first[i]
+        x.bias[i], x.soft[i], x.lower[i], x.upper[i] = 0.0, 0.0, 0.0, INFINITE
+        rate = side * line_rate(A, k, A.velocities.before)
+        if A.line.kind[k] == LINE_STOP:
             gap = stop_gap(A, k, side)
             hit = rate < 0.0 and gap + h * rate <= 0.0
-            x[LINE_BIAS] = A.line_x[k, LINE_RESTITUTION] * rate if hit else max(gap, 0.0) / h
-        elif A.line[k, LINE_KIND] == LINE_ROPE:
+            x.bias[i] = A.line_law.restitution[k] * rate if hit else max(gap, 0.0) / h
+        elif A.line.kind[k] == LINE_ROPE:
             rope_law(A, P, i, k, x)
         else:
             friction_law(A, P, i, k, x)
@@ -151,16 +127,16 @@ def line_laws(A, P, n):
 def friction_law(A, P, i, k, x):
     """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
     h = A.real.step
-    g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+    g, at = A.active.group[i], A.active.first[i]
     w = 0.0
     for d in range(A.group[g + 1] - A.group[g]):
         w += P.J[at + d] * P.Y[at + d]
-    t, arm, load = A.real.time + 0.5 * h, A.line_x[k, LINE_LOWER], A.line_x[k, FRICTION_LOAD]
-    rate = line_rate(A, k, A.wide[V_BEFORE])
-    held = h * static_friction_limit(A.S, A.W, A.line[k, LINE_FORCE], t, arm, load)
+    t, arm, load = A.real.time + 0.5 * h, A.line_law.arm[k], A.line_law.load[k]
+    rate = line_rate(A, k, A.velocities.before)
+    held = h * static_friction_limit(A.S, A.W, A.line.force[k], t, arm, load)
     if abs(rate) > REST_SHARE * held * w:
-        held = h * dry_friction(A.S, A.W, A.line[k, LINE_FORCE], t, rate, arm, load)
-    x[LINE_LOW], x[LINE_HIGH] = -held, held
+        held = h * dry_friction(A.S, A.W, A.line.force[k], t, rate, arm, load)
+    x.lower[i], x.upper[i] = -held, held
 
 
 @formula
@@ -169,36 +145,36 @@ def rope_law(A, P, i, k, x):
     pushes.
     """
     h = A.real.step
-    K, C = A.line_x[k, ROPE_K], A.line_x[k, ROPE_C]
-    g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+    K, C = A.line_law.stiffness[k], A.line_law.damping[k]
+    g, at = A.active.group[i], A.active.first[i]
     w = 0.0
     for d in range(A.group[g + 1] - A.group[g]):
         w += P.J[at + d] * P.Y[at + d]
     z = 0.25 * h * (h * K + C) * w
     b = z * z / (1.0 + z * z)
     added = h * h * K * (0.25 + 0.75 * b) + h * C * (0.5 + 0.5 * b)
-    bend = h * A.W.sensed[BEND_OF, A.line[k, LINE_QUANTITY]]
-    r = line_rate(A, k, A.wide[V_BEFORE]) - 0.5 * bend
-    stretch = A.W.sensed[VALUE, A.line[k, LINE_QUANTITY]] - A.line_x[k, ROPE_LENGTH] - 0.125 * b * h * bend
+    bend = h * A.W.sensed.bias[A.line.quantity[k]]
+    r = line_rate(A, k, A.velocities.before) - 0.5 * bend
+    stretch = A.W.sensed.value[A.line.quantity[k]] - A.line_law.length[k] - 0.125 * b * h * bend
     force = h * K * (stretch - 0.25 * (1.0 - b) * h * r) + 0.5 * h * C * (1.0 - b) * r
-    x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
+    x.bias[i], x.soft[i], x.lower[i], x.upper[i] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
 
 
 @formula
 def account_lines(A, P, X):
     """Account for the works of the single rows, and update the loads of joint friction for the next step."""
     for i in range(P.size[3]):
-        k = abs(A.active[i, LINE_OF]) - 1
-        side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
-        work = X.line[i] * side * 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
-        if A.line[k, LINE_KIND] == LINE_STOP:
+        k = abs(A.active.line[i]) - 1
+        side = 1.0 if A.active.line[i] > 0 else -1.0
+        work = X.line[i] * side * 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
+        if A.line.kind[k] == LINE_STOP:
             A.real.lost -= work
         else:
-            f = A.line[k, LINE_FORCE]
+            f = A.line.force[k]
             if A.S.forces.work[f] >= 0:
-                z = A.S.sizes.coordinates + A.wide.shape[1] + A.S.forces.work[f]
+                z = A.S.sizes.coordinates + A.velocities.before.shape[0] + A.S.forces.work[f]
                 A.clock.K[0, z] += work / A.real.step
-            A.line_x[k, LINE_REACTION] = X.line[i] * side / A.real.step
+            A.line_law.reaction[k] = X.line[i] * side / A.real.step
     update_friction_loads(A)
 
 
@@ -207,12 +183,12 @@ def update_friction_loads(A):
     """Compute the loads of joints with friction from the reactions of the step."""
     if A.S.load_terms.load.shape[0] == 0:
         return
-    for r in range(A.lam.shape[1]):
-        A.W.rows.multiplier[r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real.step
+    for r in range(A.reactions.smooth.shape[0]):
+        A.W.rows.multiplier[r] = A.reactions.smooth[r] + (A.reactions.impulse[r] + A.reactions.impact[r]) / A.real.step
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
-        if A.line[k, LINE_KIND] == LINE_FRICTION and A.S.forces.load[A.line[k, LINE_FORCE]] >= 0:
-            A.line_x[k, FRICTION_LOAD] = A.W.sensed[RETURNED, A.S.forces.load[A.line[k, LINE_FORCE]]]
+        if A.line.kind[k] == LINE_FRICTION and A.S.forces.load[A.line.force[k]] >= 0:
+            A.line_law.load[k] = A.W.sensed.returned[A.S.forces.load[A.line.force[k]]]
 
 
 @formula
@@ -220,16 +196,16 @@ def keep_stops_only(A, P, X):
     """For the position solve: stops correct their overrun, and no other single row acts."""
     A.real.overrun = 0.0
     for i in range(P.size[3]):
-        k = abs(A.active[i, LINE_OF]) - 1
-        side = 1 if A.active[i, LINE_OF] > 0 else -1
-        x = P.line_x[i]
+        k = abs(A.active.line[i]) - 1
+        side = 1 if A.active.line[i] > 0 else -1
+        x = P.line_law
         X.line[i] = 0.0
-        x[LINE_SOFT] = x[LINE_LOW] = x[LINE_HIGH] = 0.0
-        if A.line[k, LINE_KIND] == LINE_STOP:
-            mean = 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
+        x.soft[i] = x.lower[i] = x.upper[i] = 0.0
+        if A.line.kind[k] == LINE_STOP:
+            mean = 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
             gap = stop_gap(A, k, side) + A.real.step * side * mean
             A.real.overrun = min(A.real.overrun, gap)
-            x[LINE_BIAS], x[LINE_HIGH] = gap / A.real.step, INFINITE
+            x.bias[i], x.upper[i] = gap / A.real.step, INFINITE
 
 
 @formula
@@ -280,7 +256,7 @@ def mechanism_contact_rows(A, M, C, P):
             last = g
     line_rows(A, P, used, jobs, True)
     for i in range(lines):
-        queue_row(A, A.active[i, LINE_GROUP], jobs + i, A.active[i, LINE_AT], 1)
+        queue_row(A, A.active.group[i], jobs + i, A.active.first[i], 1)
     row_responses(A, P)
     line_laws(A, P, lines)
     return 0
@@ -307,7 +283,7 @@ def table_sizes(A, P, rows):
 @formula
 def queue_row(A, g, job, at, rows):
     """Queue a job: the responses to rows of group g."""
-    A.job[job, JOB_AT], A.job[job, JOB_ROWS], A.job[job, JOB_NEXT] = at, rows, A.queue[g]
+    A.job.first[job], A.job.rows[job], A.job.next[job] = at, rows, A.queue[g]
     A.queue[g] = job
 
 
@@ -325,7 +301,7 @@ def side_rows(A, P, c, where, point, rows):
 @formula
 def row_responses(A, P):
     """Compute the responses Y to all queued rows: one row of each group per solve."""
-    force, out = A.wide[GENERALISED_IMPULSE], A.wide[V_IMPULSIVE]
+    force, out = A.velocities.impulse, A.velocities.impulsive
     busy = True
     while busy:
         busy = False
@@ -339,7 +315,7 @@ def row_responses(A, P):
             read_responses(A, P, i, out)
         for g in range(A.queue.shape[0]):
             if A.queue[g] >= 0:
-                A.queue[g] = A.job[A.queue[g], JOB_NEXT]
+                A.queue[g] = A.job.next[A.queue[g]]
 
 
 @formula
@@ -350,11 +326,11 @@ def fill_impulses(A, P, i, force):
         force[d] = 0.0
     for g in range(A.queue.shape[0]):
         k = A.queue[g]
-        if k >= 0 and i < A.job[k, JOB_ROWS]:
+        if k >= 0 and i < A.job.rows[k]:
             asked += 1
             a = A.group[g]
             n = A.group[g + 1] - a
-            at = A.job[k, JOB_AT] + i * n
+            at = A.job.first[k] + i * n
             for d in range(n):
                 force[a + d] = P.J[at + d]
     return asked
@@ -365,9 +341,9 @@ def read_responses(A, P, i, out):
     """Read the responses to the impulses of `fill_impulses`."""
     for g in range(A.queue.shape[0]):
         k = A.queue[g]
-        if k >= 0 and i < A.job[k, JOB_ROWS]:
+        if k >= 0 and i < A.job.rows[k]:
             a = A.group[g]
             n = A.group[g + 1] - a
-            at = A.job[k, JOB_AT] + i * n
+            at = A.job.first[k] + i * n
             for d in range(n):
                 P.Y[at + d] = out[a + d]

@@ -33,13 +33,7 @@ from .implicit_springs import (
 )
 from .mechanism_rows import account_lines, keep_stops_only, mechanism_contact_rows, update_friction_loads
 from .stepping_tables import (
-    EFFORTS,
-    GENERALISED_IMPULSE,
     NOT_CONVERGED,
-    SPRING_ADDED_MASS,
-    SPRING_C,
-    SPRING_FORCE,
-    STEP_DISPLACEMENT,
     TASK_APPLY_IMPULSES,
     TASK_BEGIN,
     TASK_CONSISTENT,
@@ -51,11 +45,6 @@ from .stepping_tables import (
     TASK_POSES,
     TASK_ROWS,
     TASK_START,
-    V_AFTER,
-    V_BEFORE,
-    V_CHANGE,
-    V_IMPULSIVE,
-    V_SMOOTH,
     MechanismTables,
 )
 
@@ -121,9 +110,9 @@ DEPENDENT_COLUMN = 1e-12  # remainder of a column, relative to it, below which i
 @formula
 def free_velocities(A):
     """Advance half a step, and solve there for the change of velocities without contact. Returns a status."""
-    nq, nv = A.S.sizes.coordinates, A.wide.shape[1]
+    nq, nv = A.S.sizes.coordinates, A.velocities.before.shape[0]
     y, h = A.clock.y, A.real.step
-    before, change, half = A.wide[V_BEFORE], A.wide[V_CHANGE], A.mixing[HALF_STEP_ROW]
+    before, change, half = A.velocities.before, A.velocities.change, A.mixing[HALF_STEP_ROW]
     for d in range(nv):
         before[d] = y[0, nq + d]
         change[d] = 0.0
@@ -155,21 +144,21 @@ def free_velocities(A):
 def save_evaluation(A, h):
     """Store the results of the evaluation (h vdot, multipliers, driver efforts), which later solves overwrite."""
     nq = A.S.sizes.coordinates
-    for d in range(A.wide.shape[1]):
-        A.wide[V_SMOOTH, d] = h * A.clock.K[0, nq + d]
-        A.wide[EFFORTS, d] = A.W.velocities.effort[d]
-    for r in range(A.lam.shape[1]):
-        A.lam[0, r] = A.W.rows.multiplier[r]
+    for d in range(A.velocities.before.shape[0]):
+        A.velocities.smooth[d] = h * A.clock.K[0, nq + d]
+        A.velocities.effort[d] = A.W.velocities.effort[d]
+    for r in range(A.reactions.smooth.shape[0]):
+        A.reactions.smooth[r] = A.W.rows.multiplier[r]
 
 
 @formula
 def change_residual(A, h):
     """Compute the residual of the fixed-point equation for the change of velocities."""
-    now, change = A.mixing[RESIDUAL_ROW], A.wide[V_CHANGE]
+    now, change = A.mixing[RESIDUAL_ROW], A.velocities.change
     for d in range(now.shape[0]):
-        now[d] = A.wide[V_SMOOTH, d] - change[d]
+        now[d] = A.velocities.smooth[d] - change[d]
     for i in range(A.count.springs):
-        s = spring_impulse(A, h, i, A.wide[V_BEFORE], change)
+        s = spring_impulse(A, h, i, A.velocities.before, change)
         for d in range(now.shape[0]):
             now[d] -= s * A.spring_Y[i, d]
     with_spring_response(A, now)
@@ -180,8 +169,8 @@ def change_converged(A):
     """Return whether the change of velocities has converged."""
     size = 1e-300
     worst = 0.0
-    for d in range(A.wide.shape[1]):
-        size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_CHANGE, d]))
+    for d in range(A.velocities.before.shape[0]):
+        size = max(size, abs(A.velocities.before[d]) + abs(A.velocities.change[d]))
         worst = max(worst, abs(A.mixing[RESIDUAL_ROW, d]))
     return worst <= VELOCITY_CHANGE_TOLERANCE * size
 
@@ -189,7 +178,7 @@ def change_converged(A):
 @formula
 def next_guess(A, n):
     """Compute the next change of velocities by Anderson mixing: the combination of iterates with least residual."""
-    mixing, C, change = A.mixing, A.weight, A.wide[V_CHANGE]
+    mixing, C, change = A.mixing, A.weight, A.velocities.change
     now = mixing[RESIDUAL_ROW]
     kept = min(n, MIXED_GUESSES)
     for i in range(kept):  # normal equations of |now - sum w_i (now - missed_i)|
@@ -247,8 +236,8 @@ def run_task(A, M, C, P, X, task):
     if task == TASK_FREE_VELOCITIES:
         return free_step(A, M, X)
     if task == TASK_BEGIN:
-        for d in range(A.wide.shape[1]):
-            X.wide[d] = A.wide[V_BEFORE, d] + A.wide[V_CHANGE, d]
+        for d in range(A.velocities.before.shape[0]):
+            X.wide[d] = A.velocities.before[d] + A.velocities.change[d]
         for k in range(P.size[3]):
             X.line[k] = 0.0
         return 0
@@ -259,9 +248,9 @@ def run_task(A, M, C, P, X, task):
         return 0
     if task == TASK_MEAN_VELOCITIES:
         for i in range(A.S.sizes.coordinates):  # at half the step, from where TASK_FINISH continues
-            A.clock.y[2, i] = A.clock.y[0, i]
-        for d in range(A.wide.shape[1]):
-            X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+            A.clock.y[2, i] = A.clock.y.current[i]
+        for d in range(A.velocities.before.shape[0]):
+            X.wide[d] = 0.5 * (A.velocities.before[d] + A.velocities.after[d])
         keep_stops_only(A, P, X)
         return 0
     if task == TASK_FINISH:
@@ -273,21 +262,21 @@ def run_task(A, M, C, P, X, task):
         make_consistent(A, X)
         return 0
     if task == TASK_IMPACT_IMPULSES:
-        for d in range(A.wide.shape[1]):
-            A.wide[GENERALISED_IMPULSE, d] = 0.0
-        contact_impulses(A, P, X, A.wide[GENERALISED_IMPULSE])
-        impulse_response(A, A.wide[GENERALISED_IMPULSE], A.wide[V_IMPULSIVE])
-        for d in range(A.wide.shape[1]):
-            A.wide[STEP_DISPLACEMENT, d] = 0.5 * (A.wide[V_BEFORE, d] + X.wide[d])
-        add_reaction_work(A, A.output.rows[3], A.wide[STEP_DISPLACEMENT])
-        for r in range(A.lam.shape[1]):
-            A.lam[2, r] += A.output.rows[3, r]
+        for d in range(A.velocities.before.shape[0]):
+            A.velocities.impulse[d] = 0.0
+        contact_impulses(A, P, X, A.velocities.impulse)
+        impulse_response(A, A.velocities.impulse, A.velocities.impulsive)
+        for d in range(A.velocities.before.shape[0]):
+            A.velocities.displacement[d] = 0.5 * (A.velocities.before[d] + X.wide[d])
+        add_reaction_work(A, A.output.rows[3], A.velocities.displacement)
+        for r in range(A.reactions.smooth.shape[0]):
+            A.reactions.impact[r] += A.output.rows[3, r]
     if task == TASK_FINAL_VELOCITIES:
         A.real.time += A.real.step
         A.count.begun = 0
         close_energy_account(A)
-        for d in range(A.wide.shape[1]):
-            X.wide[d] = A.clock.y[0, A.S.sizes.coordinates + d]
+        for d in range(A.velocities.before.shape[0]):
+            X.wide[d] = A.clock.y.current[A.S.sizes.coordinates + d]
     return 0
 
 
@@ -299,17 +288,17 @@ def make_consistent(A, X):
     impulses along immovable directions would not remove that part, and would grow without bound where friction jams.
     """
     rows = A.output.rows
-    for d in range(A.wide.shape[1]):
+    for d in range(A.velocities.before.shape[0]):
         rows[0, d] = 0.0
     for r in range(A.S.rows.law.shape[0]):
         rows[1, r] = A.W.rows.nu[r] - row_times(A.S, A.W, r, X.wide)
     call(A.door[0], A.S, A.W, A.R, A.clock, A.output, SOLVE)
-    for d in range(A.wide.shape[1]):
-        A.wide[STEP_DISPLACEMENT, d] = X.wide[d] + 0.5 * rows[2, d]
+    for d in range(A.velocities.before.shape[0]):
+        A.velocities.displacement[d] = X.wide[d] + 0.5 * rows[2, d]
         X.wide[d] += rows[2, d]
-        A.wide[V_BEFORE, d] = X.wide[d]
+        A.velocities.before[d] = X.wide[d]
     for r in range(A.S.rows.law.shape[0]):
-        A.real.astray -= rows[3, r] * row_times(A.S, A.W, r, A.wide[STEP_DISPLACEMENT])
+        A.real.astray -= rows[3, r] * row_times(A.S, A.W, r, A.velocities.displacement)
 
 
 @formula
@@ -320,11 +309,11 @@ def start_mechanism(A, M, X):
     status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
     save_evaluation(A, A.real.step)
     nq = A.S.sizes.coordinates
-    for d in range(A.wide.shape[1]):
-        X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
-        A.wide[V_IMPULSIVE, d] = 0.0
-    for r in range(A.lam.shape[1]):
-        A.lam[1, r] = A.lam[2, r] = 0.0
+    for d in range(A.velocities.before.shape[0]):
+        X.wide[d] = A.velocities.before[d] = A.velocities.after[d] = A.clock.y.current[nq + d]
+        A.velocities.impulsive[d] = 0.0
+    for r in range(A.reactions.smooth.shape[0]):
+        A.reactions.impulse[r] = A.reactions.impact[r] = 0.0
     update_friction_loads(A)
     write_body_states(A, M, True)
     A.real.kinetic = -1.0
@@ -339,12 +328,12 @@ def free_step(A, M, X):
     if A.count.begun == 0:
         for i in range(y.shape[1]):
             y[1, i] = y[0, i]
-        for r in range(A.lam.shape[1]):
-            A.lam[2, r] = 0.0
+        for r in range(A.reactions.smooth.shape[0]):
+            A.reactions.impact[r] = 0.0
         A.count.begun = 1
     for i in range(y.shape[1]):
         y[0, i] = y[1, i]
-    for d in range(A.wide.shape[1]):
+    for d in range(A.velocities.before.shape[0]):
         y[0, nq + d] = X.wide[d]
     status = free_velocities(A)
     write_body_states(A, M, False)
@@ -370,41 +359,43 @@ def apply_step_impulses(A, P, X):
     They follow from one solve with all impulses: joints are satisfied to rounding, whatever the residual of the cone
     solver.
     """
-    nv, h = A.wide.shape[1], A.real.step
-    before, total = A.wide[V_BEFORE], A.wide[GENERALISED_IMPULSE]
+    nv, h = A.velocities.before.shape[0], A.real.step
+    before, total = A.velocities.before, A.velocities.impulse
     for d in range(nv):
         total[d] = 0.0
-        A.wide[STEP_DISPLACEMENT, d] = X.wide[d] - before[d] - A.wide[V_CHANGE, d]
+        A.velocities.displacement[d] = X.wide[d] - before[d] - A.velocities.change[d]
     contact_impulses(A, P, X, total)
     for i in range(A.count.springs):
-        s = spring_impulse(A, h, i, before, A.wide[V_CHANGE])
-        s += A.spring_x[i, SPRING_ADDED_MASS] * dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT])
+        s = spring_impulse(A, h, i, before, A.velocities.change)
+        s += A.springs.added_mass[i] * dot_rows(A.spring_J[i], A.velocities.displacement)
         for d in range(nv):
             total[d] -= s * A.spring_J[i, d]
-    impulse_response(A, total, A.wide[V_IMPULSIVE])
-    for r in range(A.lam.shape[1]):
-        A.lam[1, r] = A.output.rows[3, r]
+    impulse_response(A, total, A.velocities.impulsive)
+    for r in range(A.reactions.smooth.shape[0]):
+        A.reactions.impulse[r] = A.output.rows[3, r]
     for d in range(nv):
-        A.wide[EFFORTS, d] += A.W.velocities.effort[d] / h
-        A.wide[V_AFTER, d] = before[d] + A.wide[V_SMOOTH, d] + A.wide[V_IMPULSIVE, d]
-        A.wide[V_IMPULSIVE, d] = A.wide[V_AFTER, d] - before[d] - A.wide[V_CHANGE, d]  # by contacts and single rows
+        A.velocities.effort[d] += A.W.velocities.effort[d] / h
+        A.velocities.after[d] = before[d] + A.velocities.smooth[d] + A.velocities.impulsive[d]
+        A.velocities.impulsive[d] = (
+            A.velocities.after[d] - before[d] - A.velocities.change[d]
+        )  # by contacts and single rows
     for d in range(nv):
-        A.wide[STEP_DISPLACEMENT, d] = 0.5 * (before[d] + A.wide[V_AFTER, d])
-    add_reaction_work(A, A.lam[1], A.wide[STEP_DISPLACEMENT])
+        A.velocities.displacement[d] = 0.5 * (before[d] + A.velocities.after[d])
+    add_reaction_work(A, A.reactions.impulse, A.velocities.displacement)
     account_works(A, h)
     account_lines(A, P, X)
     correct_velocity_forces(A, h)
     for d in range(nv):
-        X.wide[d] = A.wide[V_AFTER, d]
+        X.wide[d] = A.velocities.after[d]
 
 
 @formula
 def velocities_changed(A):
     """Return whether contacts or single rows changed the velocities."""
     size, change = 1e-300, 0.0
-    for d in range(A.wide.shape[1]):
-        size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_AFTER, d]))
-        change = max(change, abs(A.wide[V_IMPULSIVE, d]))
+    for d in range(A.velocities.before.shape[0]):
+        size = max(size, abs(A.velocities.before[d]) + abs(A.velocities.after[d]))
+        change = max(change, abs(A.velocities.impulsive[d]))
     return change > NO_VELOCITY_CHANGE * size
 
 
@@ -412,9 +403,9 @@ def velocities_changed(A):
 def evaluate_at_mean(A, part):
     """Evaluate again at half the step, at the mean velocities with a part of the change by impulses."""
     nq = A.S.sizes.coordinates
-    for d in range(A.wide.shape[1]):
-        mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[V_CHANGE, d]
-        A.clock.y[0, nq + d] = mean + part * A.wide[V_IMPULSIVE, d]
+    for d in range(A.velocities.before.shape[0]):
+        mean = A.velocities.before[d] + 0.5 * A.velocities.change[d]
+        A.clock.y.current[nq + d] = mean + part * A.velocities.impulsive[d]
     return call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
 
 
@@ -426,19 +417,19 @@ def correct_velocity_forces(A, h):
     Coriolis terms compensate the change of the mass matrix along the motion. With the velocities before, impulses would
     supply energy. In absolute coordinates the projection at the end of the step has this effect.
     """
-    y, z = A.clock.y, A.S.sizes.coordinates + A.wide.shape[1]
+    y, z = A.clock.y, A.S.sizes.coordinates + A.velocities.before.shape[0]
     if A.S.sizes.solver == SCHUR or not velocities_changed(A):
         return
     for i in range(z, y.shape[1]):
         y[2, i] = A.clock.K[0, i]
     if evaluate_at_mean(A, 1.0) == 0:
-        for d in range(A.wide.shape[1]):
+        for d in range(A.velocities.before.shape[0]):
             vdot = A.clock.K[0, A.S.sizes.coordinates + d]
-            A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[V_SMOOTH, d])
+            A.velocities.after[d] += 0.5 * (h * vdot - A.velocities.smooth[d])
         for i in range(A.count.springs):  # their dampers use the velocities after impulses already
-            s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[V_IMPULSIVE])
-            for d in range(A.wide.shape[1]):
-                A.wide[V_AFTER, d] += s * A.spring_Y[i, d]
+            s = 0.5 * h * A.springs.damping[i] * dot_rows(A.spring_J[i], A.velocities.impulsive)
+            for d in range(A.velocities.before.shape[0]):
+                A.velocities.after[d] += s * A.spring_Y[i, d]
     for i in range(z, y.shape[1]):
         A.clock.K[0, i] = y[2, i]
 
@@ -473,22 +464,24 @@ def account_works(A, h):
     if velocities_changed(A):
         evaluate_at_mean(A, 0.5)
     save_gravity_work(A, h)
-    work = A.clock.K[0, S.sizes.coordinates + A.wide.shape[1] :]
+    work = A.clock.K[0, S.sizes.coordinates + A.velocities.before.shape[0] :]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
-            work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.rows.nu[r]
+            work[S.rows.work[r]] = (A.reactions.smooth[r] + A.reactions.impulse[r] / h) * W.rows.nu[r]
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
-            mean = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
-            work[S.tree.work[b]] = A.wide[EFFORTS, d] * mean
-    for d in range(A.wide.shape[1]):
-        A.wide[STEP_DISPLACEMENT, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
+            mean = 0.5 * (A.velocities.before[d] + A.velocities.after[d])
+            work[S.tree.work[b]] = A.velocities.effort[d] * mean
+    for d in range(A.velocities.before.shape[0]):
+        A.velocities.displacement[d] = A.velocities.after[d] - A.velocities.before[d]
     for i in range(A.count.springs):
-        k = int(A.spring_x[i, SPRING_FORCE])
+        k = int(A.springs.force[i])
         if S.forces.work[k] >= 0:
-            rate = dot_rows(A.spring_J[i], A.wide[V_BEFORE]) + 0.5 * dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT])
-            work[S.forces.work[k]] -= spring_impulse(A, h, i, A.wide[V_BEFORE], A.wide[STEP_DISPLACEMENT]) / h * rate
+            rate = dot_rows(A.spring_J[i], A.velocities.before) + 0.5 * dot_rows(
+                A.spring_J[i], A.velocities.displacement
+            )
+            work[S.forces.work[k]] -= spring_impulse(A, h, i, A.velocities.before, A.velocities.displacement) / h * rate
 
 
 @formula
@@ -514,11 +507,11 @@ def finish_step(A, M, X):
 
     It may be called again with other displacements.
     """
-    S, nq, nv, h = A.S, A.S.sizes.coordinates, A.wide.shape[1], A.real.step
-    y, way = A.clock.y, A.wide[STEP_DISPLACEMENT]
+    S, nq, nv, h = A.S, A.S.sizes.coordinates, A.velocities.before.shape[0], A.real.step
+    y, way = A.clock.y, A.velocities.displacement
     for d in range(nv):
-        way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]
-        y[0, nq + d] = A.wide[V_AFTER, d]
+        way[d] = 0.5 * h * A.velocities.after[d] + h * X.wide[d]
+        y[0, nq + d] = A.velocities.after[d]
     for i in range(nq):
         y[0, i] = y[2, i]
     retract(S, y[0, :nq], way)

@@ -16,7 +16,6 @@ none closes.
 
 from __future__ import annotations
 
-from ...collision.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ...compiler.formulas import call, formula
 from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, scale, store3, sub
@@ -32,28 +31,9 @@ from ...tables.table_definitions import RESTITUTION
 from .compliant_contact import contact_stiffness
 from .free_bodies import rest_speed
 from .stepping_tables import (
-    ADDRESS_IMPACTS,
-    COMPLIANT,
-    GIVEN_BY_SURFACES,
-    HISTORY_HIT,
-    HISTORY_IMPACT_IMPULSE,
-    HISTORY_IMPACT_SPIN,
-    HISTORY_IMPACT_VELOCITY,
-    IMPACTS,
-    LOST_FRICTION,
-    LOST_IMPACT,
     MOREAU,
-    NO_OVERLAP_BELOW,
     NO_RESTITUTION,
     POISSON,
-    REDUCED_EXPANSIONS,
-    REPORTED_RESIDUAL,
-    RESTITUTION_LAW,
-    SEQUENTIAL,
-    STEP,
-    UNCONVERGED,
-    VELOCITY_ITERATIONS,
-    VELOCITY_TOLERANCE,
 )
 
 IMPACTS_PER_CONTACT = 200  # impacts per contact, after which closing contacts are left to the step
@@ -62,30 +42,30 @@ NO_CLOSING = 1e-12  # negligible closing speed, relative to the largest
 
 
 @formula
-def sequential_impacts(R, Z, X, C, pace, now):
+def sequential_impacts(R, Z, X, C, state, now):
     """Compute sequential impacts; impulses in ``Z.p``, velocities in ``X``. Returns whether all are completed.
 
     ``R.least`` holds their restitutions. Contacts that close within the step because of other impacts have one too.
     """
-    n = C.count[FOUND]
+    n = C.count.found
     for c in range(n):
         for i in range(3):
             Z.p[c, i] = 0.0
     fastest = 0.0
     for c in range(n):
-        if now[c, HISTORY_HIT] > 0.0:
-            fastest = max(fastest, -now[c, HISTORY_IMPACT_VELOCITY])
+        if now.hit[c] > 0.0:
+            fastest = max(fastest, -now.impact_velocity[c, 0])
     for _ in range(IMPACTS_PER_CONTACT * n):
         first, most = -1, NO_CLOSING * fastest
         for c in range(n):
-            if now[c, HISTORY_HIT] > 0.0 or R.least[c] > 0.0:
+            if now.hit[c] > 0.0 or R.least[c] > 0.0:
                 u = contact_velocity(R, X.v, X.wide, c)
-                there = now[c, HISTORY_HIT] > 0.0 or C.x[c, GAP] + pace.real[STEP] * u[0] <= pace.real[NO_OVERLAP_BELOW]
+                there = now.hit[c] > 0.0 or C.x.gap[c] + state.times.step * u[0] <= state.tolerances.overlap
                 if there and -u[0] > most:
                     first, most = c, -u[0]
         if first < 0:
             return True
-        now[first, HISTORY_HIT] = 1.0
+        now.hit[first] = 1.0
         single_impact(R, Z, X, first, R.least[first])
     return False
 
@@ -166,64 +146,64 @@ ITERATION_FACTOR = 4  # iterations relative to those of velocity solves, which a
 @formula
 def restitution_of(G, C, L, c):
     """Return the coefficient of restitution of contact c."""
-    return L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL], RESTITUTION]
+    return L.pair[G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]], RESTITUTION]
 
 
 @formula
-def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now):
     """Resolve the impacts found by `find_impacts`; ``X.v`` and ``X.wide`` become the velocities after them.
 
     ``R`` is the problem with its own biases and least normal impulses, ``Z`` the state of compression, which shares its
     velocities with ``X``, ``E`` that of expansion.
     """
-    if pace.count[SEQUENTIAL] != 0:
-        for c in range(C.count[FOUND]):
+    if state.options.sequential != 0:
+        for c in range(C.count.found):
             R.least[c] = restitution_of(G, C, L, c)
-        if not sequential_impacts(R, Z, X, C, pace, now):
-            pace.count[REDUCED_EXPANSIONS] += 1
-    elif pace.count[RESTITUTION_LAW] == POISSON:
-        poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now)
+        if not sequential_impacts(R, Z, X, C, state, now):
+            state.counts.reduced_expansions += 1
+    elif state.options.restitution_law == POISSON:
+        poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now)
     else:
-        newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now)
-    account_impacts(R, bias, Z, X, C, pace, now)
+        newton_impacts(C, bias, R, Z, E, X, W, O, F, state, now)
+    account_impacts(R, bias, Z, X, C, state, now)
 
 
 @formula
 def clear_impact_impulses(C, now):
     """Clear the impact impulses of the step."""
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         for i in range(3):
-            now[c, HISTORY_IMPACT_IMPULSE + i] = 0.0
+            now.impact_impulse[c, i] = 0.0
 
 
 @formula
-def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, state, now):
     """Apply Poisson's law: an inelastic impact, then expansion."""
-    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, Z, W, O, F, pace)
-    for c in range(C.count[FOUND]):
-        R.least[c] = restitution_of(G, C, L, c) * Z.p[c, 0] if now[c, HISTORY_HIT] > 0.0 else 0.0
+    solve_from_zero(state.addresses.impacts, R, Z, W, O, F, state)
+    for c in range(C.count.found):
+        R.least[c] = restitution_of(G, C, L, c) * Z.p[c, 0] if now.hit[c] > 0.0 else 0.0
     copy_velocities(X, E)
-    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, E, W, O, F, pace)
-    add_expansion(R, bias, Z, E, X, C, pace, now)
+    solve_from_zero(state.addresses.impacts, R, E, W, O, F, state)
+    add_expansion(R, bias, Z, E, X, C, state, now)
 
 
 @formula
-def newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now):
+def newton_impacts(C, bias, R, Z, E, X, W, O, F, state, now):
     """Apply Newton's or Moreau's law; where it would add energy, reduced to what an inelastic impact leaves."""
     copy_velocities(X, E)
-    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, E, W, O, F, pace)
+    solve_from_zero(state.addresses.impacts, R, E, W, O, F, state)
     if impulse_energy(R, bias, E, E, C, now) <= 0.0:
         copy_velocities(E, X)
-        for c in range(C.count[FOUND]):
+        for c in range(C.count.found):
             add_impulses(Z, 0.0, E, 1.0, c)
         return
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         for i in range(3):
-            R.bias[c, i] = 0.0 if i == 0 and now[c, HISTORY_HIT] > 0.0 else bias[c, i]
-    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, Z, W, O, F, pace)
-    for c in range(C.count[FOUND]):
+            R.bias[c, i] = 0.0 if i == 0 and now.hit[c] > 0.0 else bias[c, i]
+    solve_from_zero(state.addresses.impacts, R, Z, W, O, F, state)
+    for c in range(C.count.found):
         add_impulses(E, 1.0, Z, -1.0, c)
-    add_expansion(R, bias, Z, E, X, C, pace, now)
+    add_expansion(R, bias, Z, E, X, C, state, now)
 
 
 @formula
@@ -245,48 +225,48 @@ def copy_velocities(X, E):
 
 
 @formula
-def find_impacts(G, C, at, bias, R, X, L, pace, now):
+def find_impacts(G, C, at, bias, R, X, L, state, now):
     """Return whether there are impacts; set the biases of their contacts, and store their velocities in ``now``."""
-    if pace.count[RESTITUTION_LAW] == NO_RESTITUTION:
+    if state.options.restitution_law == NO_RESTITUTION:
         return False
-    h = pace.real[STEP]
-    slowest = rest_speed(pace, h)
+    h = state.times.step
+    slowest = rest_speed(state, h)
     found = False
-    law = pace.count[RESTITUTION_LAW]
-    for c in range(C.count[FOUND]):
+    law = state.options.restitution_law
+    for c in range(C.count.found):
         R.least[c] = 0.0
-        gives_way = pace.count[COMPLIANT] != 0 and contact_stiffness(G, C, L, c) > 0.0
+        gives_way = state.options.compliant != 0 and contact_stiffness(G, C, L, c) > 0.0
         for i in range(2):  # compliant contacts have no instantaneous impulse
             R.at[c, i] = FIXED_SIDE if gives_way else at[c, i]
         u = contact_velocity(R, X.v, X.wide, c)
-        store3(now, c, HISTORY_IMPACT_VELOCITY, u)
+        store3(now.impact_velocity, c, 0, u)
         store3(R.bias, c, 0, load3(bias, c, 0))
         if R.turn.shape[0] > 0:
-            store3(now, c, HISTORY_IMPACT_SPIN, contact_angular_velocity(R, X.v, X.wide, c))
+            store3(now.impact_spin, c, 0, contact_angular_velocity(R, X.v, X.wide, c))
         e = restitution_of(G, C, L, c)
-        now[c, HISTORY_HIT] = 0.0
-        plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[NO_OVERLAP_BELOW]
+        now.hit[c] = 0.0
+        plain = state.options.sequential != 0 and C.x.gap[c] <= state.tolerances.overlap
         if gives_way:
             R.bias[c, 0] = 0.0
             continue
-        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= pace.real[
-            NO_OVERLAP_BELOW
-        ]:  # also contacts resting against a body that has an impact
-            now[c, HISTORY_HIT] = 1.0
+        if (e > 0.0 or plain) and C.x.gap[c] + h * u[
+            0
+        ] <= state.tolerances.overlap:  # also contacts resting against a body that has an impact
+            now.hit[c] = 1.0
             found = found or (e > 0.0 and u[0] < -slowest)
             R.bias[c, 0] = 0.0
             if law != POISSON and u[0] < 0.0:
                 R.bias[c, 0] = e * u[0]
                 for i in range(1, 3 if law == MOREAU else 1):
                     R.bias[c, i] += e * u[i]
-        elif C.x[c, GAP] > NEAR_GAPS * pace.real[NO_OVERLAP_BELOW]:
+        elif C.x.gap[c] > NEAR_GAPS * state.tolerances.overlap:
             for i in range(2):  # it cannot close during an impact, which takes no time: it is left to the next round
                 R.at[c, i] = FIXED_SIDE
     return found
 
 
 @formula
-def solve_from_zero(address, R, Z, W, O, F, pace):
+def solve_from_zero(address, R, Z, W, O, F, state):
     """Solve starting from zero impulses."""
     for c in range(R.size[0]):
         for i in range(3):
@@ -295,11 +275,11 @@ def solve_from_zero(address, R, Z, W, O, F, pace):
             Z.torque[c, i] = 0.0
     for k in range(R.size[3]):
         Z.line[k] = 0.0
-    O.count.most = ITERATION_FACTOR * pace.count[VELOCITY_ITERATIONS]
-    O.real.enough = pace.real[VELOCITY_TOLERANCE]
+    O.count.most = ITERATION_FACTOR * state.options.velocity_iterations
+    O.real.enough = state.tolerances.velocity
     call(address, R, Z, W, O, F.impacts, 0)
-    if O.count.ended != CONVERGED and O.real.residual > pace.real[REPORTED_RESIDUAL] * pace.real[STEP]:
-        pace.count[UNCONVERGED] += 1
+    if O.count.ended != CONVERGED and O.real.residual > state.tolerances.reported * state.times.step:
+        state.counts.unconverged += 1
 
 
 @formula
@@ -310,11 +290,11 @@ def impulse_energy(R, bias, Z, X, C, now):
     It includes moving surfaces (``bias`` along the tangents), which may supply energy.
     """
     total = 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         for i in range(3):
             own = bias[c, i] if i > 0 else 0.0
-            total += Z.p[c, i] * (0.5 * (u[i] + now[c, HISTORY_IMPACT_VELOCITY + i]) + own)
+            total += Z.p[c, i] * (0.5 * (u[i] + now.impact_velocity[c, i]) + own)
         total += torque_impulse_energy(R, Z, X, c, now)
     return total
 
@@ -325,12 +305,12 @@ def torque_impulse_energy(R, Z, X, c, now):
     if R.turn.shape[0] == 0:
         return 0.0
     return 0.5 * dot(
-        load3(Z.torque, c, 0), add(contact_angular_velocity(R, X.v, X.wide, c), load3(now, c, HISTORY_IMPACT_SPIN))
+        load3(Z.torque, c, 0), add(contact_angular_velocity(R, X.v, X.wide, c), load3(now.impact_spin, c, 0))
     )
 
 
 @formula
-def add_expansion(R, bias, Z, E, X, C, pace, now):
+def add_expansion(R, bias, Z, E, X, C, state, now):
     """Add the impulses E.p to Z.p and move X's velocities towards those of ``E``, as far as the energy allows.
 
     At the part s of the way from X to E the energy has grown by a s + b s^2, with a = p . u, b = p . (u+ - u) / 2. All
@@ -338,7 +318,7 @@ def add_expansion(R, bias, Z, E, X, C, pace, now):
     """
     there = max(0.0, -impulse_energy(R, bias, Z, X, C, now))
     a, b = 0.0, 0.0
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         w = contact_velocity(R, E.v, E.wide, c)
         for i in range(3):
@@ -357,35 +337,38 @@ def add_expansion(R, bias, Z, E, X, C, pace, now):
         s = (sqrt(a * a + 4.0 * b * there) - a) / (2.0 * b)
         s = min(1.0, max(0.0, s))
         if s < REDUCED_BELOW:
-            pace.count[REDUCED_EXPANSIONS] += 1
+            state.counts.reduced_expansions += 1
     for k in range(X.v.shape[0]):
         for i in range(6):
             X.v[k, i] += s * (E.v[k, i] - X.v[k, i])
     for k in range(X.wide.shape[0]):
         X.wide[k] += s * (E.wide[k] - X.wide[k])
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         add_impulses(Z, 1.0, E, s, c)
 
 
 @formula
-def account_impacts(R, bias, Z, X, C, pace, now):
+def account_impacts(R, bias, Z, X, C, state, now):
     """Store the impulses of the impacts, and account for the energy lost."""
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         u = contact_velocity(R, X.v, X.wide, c)
         worn = -torque_impulse_energy(R, Z, X, c, now)
         for i in range(3):
-            mean = 0.5 * (u[i] + now[c, HISTORY_IMPACT_VELOCITY + i])
+            mean = 0.5 * (u[i] + now.impact_velocity[c, i])
             if i == 0:
-                pace.real[LOST_IMPACT] -= Z.p[c, 0] * mean
+                state.sums.impact_loss -= Z.p[c, 0] * mean
             else:  # the bias of a moving surface is its own velocity
                 worn -= Z.p[c, i] * (mean + bias[c, i])
-                pace.real[GIVEN_BY_SURFACES] -= Z.p[c, i] * bias[c, i]
+                state.sums.surface_work -= Z.p[c, i] * bias[c, i]
         # a negative mean, where the slip reverses in the impact, is counted as impact; the sum of both is exact
-        pace.real[LOST_FRICTION if worn >= 0.0 else LOST_IMPACT] += worn
+        if worn >= 0.0:
+            state.sums.friction_loss += worn
+        else:
+            state.sums.impact_loss += worn
         store3(
-            now,
+            now.impact_impulse,
             c,
-            HISTORY_IMPACT_IMPULSE,
-            add(load3(now, c, HISTORY_IMPACT_IMPULSE), to_world_frame(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])),
+            0,
+            add(load3(now.impact_impulse, c, 0), to_world_frame(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])),
         )
-    pace.count[IMPACTS] += 1
+    state.counts.impacts += 1

@@ -10,7 +10,7 @@ import numpy as np
 from ...assembly.assemble import assemble
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import compile_mechanism
-from ...collision.tables import RADIUS, Movers
+from ...collision.tables import Movers
 from ...engine.calls import OutputBuffer
 from ...engine.residual import DIRECTIONS, SLOPE_WIDTH
 from ...engine.stabilization import STEPS
@@ -22,7 +22,7 @@ from ...model.force import CoordinateForce, TwoPointForce
 from ...model.geometry import matrix_to_quaternion
 from ...model.model import Model
 from ...numerics.integrators.butcher_tableaux import tableau
-from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...results.phases import cumulative_exchanges, energies_at_end
 from ...results.result import Result
 from ...tables import table_definitions as su
@@ -38,36 +38,21 @@ from ..integration_options import RESTITUTION_LAWS, Stepping
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
 from .stepper import Stepper, free_bodies
 from .stepping_tables import (
-    COMPLIANT,
-    COUNTS,
-    DIVIDES_STEPS,
-    GRAVITY,
     LINE_FRICTION,
-    LINE_LOWER,
-    LINE_RESTITUTION,
     LINE_ROPE,
     LINE_STOP,
-    LINE_UPPER,
-    NO_BOUNCE_BELOW,
-    NO_OVERLAP_BELOW,
     NO_RESTITUTION,
-    POSITION_ITERATIONS,
-    POSITION_TOLERANCE,
-    REALS,
-    REPORTED_RESIDUAL,
-    RESTITUTION_LAW,
-    ROPE_C,
-    ROPE_K,
-    ROPE_LENGTH,
-    SEQUENTIAL,
-    V_AFTER,
-    V_BEFORE,
-    VELOCITY_ITERATIONS,
-    VELOCITY_TOLERANCE,
+    ActiveRows,
+    Jobs,
     MechanismCounts,
+    MechanismReactions,
     MechanismReals,
     MechanismTables,
-    RunState,
+    MechanismVelocities,
+    SingleRowLaws,
+    SingleRows,
+    Springs,
+    initial_run_state,
 )
 
 
@@ -124,7 +109,7 @@ def mechanism_tables(
     s, S = c.structure, c.values.system
     of, group = velocity_groups(S, s.nv)
     rows = [s.place[name] for name in bodies]
-    y = np.zeros((STATE_ROWS, len(start.y)))
+    y = StateVectors.blank(len(start.y))
     y[0] = start.y
     width = max(len(start.y) + 1, s.nv, len(S.rows.law), 1)
     clock = StepState(
@@ -135,18 +120,19 @@ def mechanism_tables(
     springs = int(slopes[:, DIRECTIONS].sum())
     c.work.options.stabilization, c.work.options.deferred = STEPS, 0.0
     S = S._replace(force_parameters=S.force_parameters.copy())
-    line, line_x = single_rows(s, S, stops or {})
+    line, law = single_rows(s, S, stops or {})
     A = MechanismTables(
         S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes),
         np.zeros(1, np.int64),
         real=MechanismReals.blank(), count=MechanismCounts.blank(),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
-        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
-        spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
+        group=group, velocities=MechanismVelocities(*np.zeros((8, s.nv))),
+        reactions=MechanismReactions(*np.zeros((3, len(S.rows.law)))),
+        springs=Springs.blank(springs), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
         stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)),
         weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
-        line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
-        job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
+        line=line, line_law=law, active=ActiveRows.blank(2 * len(line)),
+        job=Jobs.blank(0), queue=np.zeros(len(group) - 1, np.int64),
         pose=np.zeros((len(rows), 12)),
     )  # fmt: skip
     A.count.first = first
@@ -154,27 +140,30 @@ def mechanism_tables(
     return A
 
 
-def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tuple[np.ndarray, np.ndarray]:
+def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tuple[SingleRows, SingleRowLaws]:
     """Return the tables of single rows (stops, ropes, joint friction), and remove these from the forces."""
-    line, line_x = [], []
+    line, laws = [], []
     for k, e in enumerate(s.forces):
-        x = np.zeros(8)
+        law = SingleRowLaws.blank(1)
         if e.name in stops:
             kind = LINE_STOP
-            x[[LINE_LOWER, LINE_UPPER, LINE_RESTITUTION]] = stops[e.name]
+            law.lower, law.upper, law.restitution = stops[e.name]
         elif e.single == "rope":
             kind = LINE_ROPE
-            x[[ROPE_K, ROPE_C, ROPE_LENGTH]] = S.force_parameters[k, :3]
+            law.stiffness, law.damping, law.length = S.force_parameters[k, :3]
             S.force_parameters[k, :2] = 0.0
         elif e.single == "friction":
             kind = LINE_FRICTION
-            x[LINE_LOWER] = S.force_parameters[k, 0]
+            law.arm = S.force_parameters[k, 0]
             S.force_parameters[k, 0] = 0.0
         else:
             continue
         line.append((kind, S.forces.F[k], k))
-        line_x.append(x)
-    return np.array(line, np.int64).reshape(-1, 3), np.array(line_x).reshape(-1, 8)
+        laws.append(law)
+    return (
+        np.array(line, np.int64).reshape(-1, SingleRows.layout.width).view(SingleRows),
+        np.concatenate([SingleRowLaws.blank(0), *laws]).view(SingleRowLaws),
+    )
 
 
 def force_directions(force) -> int:
@@ -305,12 +294,12 @@ class MechanismMotion:
     def add(self, A: MechanismTables, moved: bool) -> None:
         """Record the present state, and mean accelerations and multipliers of the last step if there was one."""
         h = float(A.real.step) if moved else 1.0
-        self.y.append(A.clock.y[0].copy())
-        self.vdot.append((A.wide[V_AFTER] - A.wide[V_BEFORE]) / h)
-        self.lam.append(A.lam[0] + (A.lam[1] + A.lam[2]) / h)
+        self.y.append(A.clock.y.current.copy())
+        self.vdot.append((A.velocities.after - A.velocities.before) / h)
+        self.lam.append(A.reactions.smooth + (A.reactions.impulse + A.reactions.impact) / h)
         s = self.start.assembly.compiled.structure
         W = self.start.assembly.compiled.work
-        lost = self.start.assembly.compiled.jacobian() @ A.clock.y[0, s.nq : s.nq + s.nv] - W.rows.nu
+        lost = self.start.assembly.compiled.jacobian() @ A.clock.y.current[s.nq : s.nq + s.nv] - W.rows.nu
         self.gaps.append(float(np.abs(W.rows.value).max(initial=0.0)))
         self.slips.append(float(np.abs(lost).max(initial=0.0)))
 
@@ -430,7 +419,7 @@ OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 1
 
 def smallest_radius(scene: ContactTables, values: Values) -> float:
     """Return the radius [m] of the smallest shape; the mechanism's length if all are unbounded."""
-    sizes = scene.geometry.shape_x[:, RADIUS]
+    sizes = scene.geometry.dimensions.radius[:]
     bounded = sizes[np.isfinite(sizes)]
     return float(bounded.min() if len(bounded) else values.length)
 
@@ -455,33 +444,28 @@ def make_stepper(
 ) -> Stepper:
     """Create the stepper at the start."""
     planar = values.structure.model.planar
-    real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
-    real[GRAVITY : GRAVITY + 3] = values.system.gravity
+    state = initial_run_state(values.system.gravity)
+    options, tolerances = state.options, state.tolerances
     size = smallest_radius(scene, values)
-    real[NO_BOUNCE_BELOW], real[NO_OVERLAP_BELOW] = SLOW_CONTACT, NO_OVERLAP * size
-    real[VELOCITY_TOLERANCE], real[POSITION_TOLERANCE] = o.tolerance, o.tolerance
-    real[REPORTED_RESIDUAL] = max(
-        float(np.sqrt((real[GRAVITY : GRAVITY + 3] ** 2).sum())), COARSE_FACTOR * o.tolerance / o.longest
-    )
+    tolerances.rebound_speed, tolerances.overlap = SLOW_CONTACT, NO_OVERLAP * size
+    tolerances.velocity = tolerances.position = o.tolerance
+    tolerances.reported = max(float(np.sqrt((state.gravity**2).sum())), COARSE_FACTOR * o.tolerance / o.longest)
     usual = DEFAULT_ITERATIONS.get(o.solver, OTHER_ITERATIONS)
-    count[VELOCITY_ITERATIONS], count[POSITION_ITERATIONS] = (
-        o.iterations or usual,
-        o.position_iterations or max(DEFAULT_POSITION_ITERATIONS, usual // 2),
-    )
+    options.velocity_iterations = o.iterations or usual
+    options.position_iterations = o.position_iterations or max(DEFAULT_POSITION_ITERATIONS, usual // 2)
     law = RESTITUTION_LAWS.index(o.restitution) + 1
-    count[RESTITUTION_LAW] = (
+    options.restitution_law = (
         law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
     )
     n = len(M.pose) - (len(held.joints.mover) if held else 0)
     turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
-    count[DIVIDES_STEPS] = o.step is None
-    count[SEQUENTIAL] = o.impacts == "sequential"
-    count[COMPLIANT] = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
-    pace = RunState(real, count, np.zeros(8, np.int64))
+    options.divides_steps = o.step is None
+    options.sequential = o.impacts == "sequential"
+    options.compliant = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], CONTACT_MARGIN * size
-    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
+    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints)
     choices = stepper.workspaces.O.count
     choices.coulomb = o.coulomb
     choices.most_steps = DEFAULT_SOLVER_STEPS if o.iterations is None else 0

@@ -14,18 +14,8 @@ from ...collision.broad_phase.workspace import Search
 from ...collision.contact_search import MIDWAY, NEW_VELOCITIES
 from ...collision.contact_search import STEP as STEP_ON
 from ...collision.tables import (
-    AHEAD,
-    BEFORE,
     DONE,
-    FOUND,
     FULL_CONTACTS,
-    GAP,
-    MOVER,
-    NORMAL,
-    NUMBER,
-    POINT,
-    SHAPE_1,
-    SHAPE_2,
     Contacts,
     Geometry,
     Movers,
@@ -78,38 +68,9 @@ from .free_bodies import (
 )
 from .restitution import IMPACT_ROUNDS, clear_impact_impulses, find_impacts, resolve_impacts
 from .stepping_tables import (
-    ADDRESS_IMPACTS,
-    ADDRESS_MECHANISM,
-    ADDRESS_POSITIONS,
-    ADDRESS_SEARCH,
-    ADDRESS_VELOCITIES,
-    COMPLIANT,
-    ENDLESS_IMPACTS,
-    GIVEN_BY_SURFACES,
-    HISTORY_HIT,
-    HISTORY_IMPACT_IMPULSE,
-    HISTORY_PERSISTS,
-    HISTORY_STIFFNESS,
-    IMPACTS,
-    ITERATIONS,
-    LAST_RESIDUAL,
-    LAST_STEP,
-    LOST_FRICTION,
-    LOST_IMPACT,
     MIDDLE_FOUND,
-    MOST_CONTACTS,
-    NO_OVERLAP_BELOW,
     NO_SOLUTION,
-    NUMERICAL,
-    OVERLAP_AT_START,
-    POSITION_ITERATIONS,
-    POSITION_TOLERANCE,
-    REDUCED_EXPANSIONS,
-    REPORTED_RESIDUAL,
-    STEP,
     STEP_TOO_LONG,
-    STEPS_LEFT,
-    STEPS_TAKEN,
     TABLES_FULL,
     TASK_APPLY_IMPULSES,
     TASK_BEGIN,
@@ -120,14 +81,6 @@ from .stepping_tables import (
     TASK_MEAN_VELOCITIES,
     TASK_POSES,
     TASK_ROWS,
-    TIME,
-    UNCONVERGED,
-    VELOCITY_ITERATIONS,
-    VELOCITY_TOLERANCE,
-    WORST_AT,
-    WORST_FORCE,
-    WORST_OVERLAP,
-    WORST_RESIDUAL,
     ContactHistory,
     FreeBodies,
     MechanismTables,
@@ -150,12 +103,12 @@ def bind_solvers(
     X: ContactState,
     W: ContactWorkspace,
     O: SolverSettings,
-    pace: RunState,
+    state: RunState,
 ) -> StepSolvers:
-    """Bind a solver for velocities, positions and impacts; its addresses are stored in ``pace.door``."""
+    """Bind a solver for velocities, positions and impacts; its addresses are stored in ``state.addresses``."""
     found = [prepare_solver(name, P, X, W, O) for P in problems]
-    for place, one in zip((ADDRESS_VELOCITIES, ADDRESS_POSITIONS, ADDRESS_IMPACTS), found, strict=True):
-        pace.door[place] = one.kernel.address
+    to = state.addresses
+    to.velocities, to.positions, to.impacts = (one.kernel.address for one in found)
     return StepSolvers(*(one.F for one in found))
 
 
@@ -184,153 +137,153 @@ def shift_by_joints(A, M, mover, axis, arm):
 def change_of_gap(G, A, M, C, P, c):
     """Return the change of the gap of contact c by the projection onto the joints."""
     n = load3(P.frame, c, 0)
-    a, b = G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+    a, b = G.shape.mover[C.at.shape_1[c]], G.shape.mover[C.at.shape_2[c]]
     return shift_by_joints(A, M, b, n, load3(P.arm, c, 3)) - shift_by_joints(A, M, a, n, load3(P.arm, c, 0))
 
 
 @formula
-def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, pace):
+def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, state):
     """Return whether contacts overlap now; then set the gaps in ``Q`` to ``aim`` plus the change by the projection.
 
     ``aim`` has in column 0 the velocity that leaves no gap, with which ``Y`` was computed.
     """
     if not A.real.kinetic >= 0.0:
         return False
-    h, worst = pace.real[STEP], 0.0
-    for c in range(C.count[FOUND]):
+    h, worst = state.times.step, 0.0
+    for c in range(C.count.found):
         change = change_of_gap(G, A, M, C, P, c)
         if change != 0.0:
             worst = min(worst, h * (aim[c, 0] + contact_velocity(P, Y.v, Y.wide, c)[0]) + change)
-    if worst >= -OVERLAP_FACTOR * pace.real[NO_OVERLAP_BELOW]:
+    if worst >= -OVERLAP_FACTOR * state.tolerances.overlap:
         return False
-    for c in range(C.count[FOUND]):
+    for c in range(C.count.found):
         Q.bias[c, 0] = aim[c, 0] + change_of_gap(G, A, M, C, P, c) / h
-    Q.size[0] = C.count[FOUND]
+    Q.size[0] = C.count.found
     return True
 
 
 @formula
-def solve_cone_problem(address, P, X, W, O, F, pace, most, enough):
+def solve_cone_problem(address, P, X, W, O, F, state, most, enough):
     """Call a solver and count its iterations; return its status."""
     O.count.most = most
     O.real.enough = enough
-    pace.count[ITERATIONS] += call(address, P, X, W, O, F, 0)
+    state.counts.iterations += call(address, P, X, W, O, F, 0)
     return O.count.ended
 
 
 @formula
-def call_mechanism(A, M, C, P, X, pace, task):
+def call_mechanism(A, M, C, P, X, state, task):
     """Run a task of the mechanism, if there is one; see `mechanism_step.run_task`."""
-    if pace.door[ADDRESS_MECHANISM] == 0:
+    if state.addresses.mechanism == 0:
         return DONE
-    return call(pace.door[ADDRESS_MECHANISM], A, M, C, P, X, task)
+    return call(state.addresses.mechanism, A, M, C, P, X, task)
 
 
 @formula
-def free_velocities_of_all(A, M, C, P, X, N, pace):
+def free_velocities_of_all(A, M, C, P, X, N, state):
     """Compute the velocities of all bodies at the end of the step without contact."""
-    velocities_without_contact(N, M, P, X, pace)
-    A.real.time, A.real.step = pace.real[TIME], pace.real[STEP]
-    return call_mechanism(A, M, C, P, X, pace, TASK_FREE_VELOCITIES)
+    velocities_without_contact(N, M, P, X, state)
+    A.real.time, A.real.step = state.times.now, state.times.step
+    return call_mechanism(A, M, C, P, X, state, TASK_FREE_VELOCITIES)
 
 
 @formula
-def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
+def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, state, now, before):
     """Solve the cone problem for the velocities at the end of the step, and record its residual.
 
     Returns DONE, or STEP_TOO_LONG for compliant contacts, before anything is solved.
     """
     warm_start(C, P, X, now, before)
-    static_friction_of_sticking(G, C, P, L, X, pace, now)
-    yielding = pace.count[COMPLIANT] != 0 and find_compliant_contacts(G, C, P, L, X, pace, now, before)
+    static_friction_of_sticking(G, C, P, L, X, state, now)
+    yielding = state.options.compliant != 0 and find_compliant_contacts(G, C, P, L, X, state, now, before)
     start_from_free_velocities(N, M, X)
-    call_mechanism(A, M, C, P, X, pace, TASK_BEGIN)
-    if yielding and start_compliant_rows(G, C, P, L, X, pace, now, before):
+    call_mechanism(A, M, C, P, X, state, TASK_BEGIN)
+    if yielding and start_compliant_rows(G, C, P, L, X, state, now, before):
         return STEP_TOO_LONG
     ended = solve_cone_problem(
-        pace.door[ADDRESS_VELOCITIES],
+        state.addresses.velocities,
         P,
         X,
         W,
         O,
         F.velocities,
-        pace,
-        pace.count[VELOCITY_ITERATIONS],
-        pace.real[VELOCITY_TOLERANCE],
+        state,
+        state.options.velocity_iterations,
+        state.tolerances.velocity,
     )
     for n in range(LAW_ITERATIONS if yielding else 0):
-        if law_is_met(linearise_compliant_rows(G, C, P, L, X, pace, now), O.real.residual, pace) or (
+        if law_is_met(linearise_compliant_rows(G, C, P, L, X, state, now), O.real.residual, state) or (
             ended != CONVERGED and n == FEW_LAW_ITERATIONS
         ):
             break
         restore_free_velocities(N, M, X)
-        call_mechanism(A, M, C, P, X, pace, TASK_BEGIN)
+        call_mechanism(A, M, C, P, X, state, TASK_BEGIN)
         ended = solve_cone_problem(
-            pace.door[ADDRESS_VELOCITIES],
+            state.addresses.velocities,
             P,
             X,
             W,
             O,
             F.velocities,
-            pace,
-            pace.count[VELOCITY_ITERATIONS],
-            pace.real[VELOCITY_TOLERANCE],
+            state,
+            state.options.velocity_iterations,
+            state.tolerances.velocity,
         )
-    if ended != CONVERGED and O.real.residual > pace.real[REPORTED_RESIDUAL] * pace.real[STEP]:
-        pace.count[UNCONVERGED] += 1
-    pace.real[LAST_RESIDUAL] = O.real.residual
-    if O.real.residual > pace.real[WORST_RESIDUAL]:
-        pace.real[WORST_RESIDUAL] = O.real.residual
-        pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
-    pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real.force_residual)
-    call_mechanism(A, M, C, P, X, pace, TASK_APPLY_IMPULSES)
+    if ended != CONVERGED and O.real.residual > state.tolerances.reported * state.times.step:
+        state.counts.unconverged += 1
+    state.worst.last_residual = O.real.residual
+    if O.real.residual > state.worst.residual:
+        state.worst.residual = O.real.residual
+        state.worst.time = state.times.now + state.times.step
+    state.worst.force_residual = max(state.worst.force_residual, O.real.force_residual)
+    call_mechanism(A, M, C, P, X, state, TASK_APPLY_IMPULSES)
     return DONE
 
 
 @formula
-def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
+def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now):
     """Compute the displacements that leave no overlap, and close the gaps of persistent contacts, from mean velocities.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. The works of
     impulses are accounted for here, since the mean velocities are available.
     """
-    h = pace.real[STEP]
+    h = state.times.step
     mean_velocities(N, X, Y)
-    call_mechanism(A, M, C, P, Y, pace, TASK_MEAN_VELOCITIES)
-    deepest = A.real.overrun if pace.door[ADDRESS_MECHANISM] != 0 else 0.0
-    for c in range(C.count[FOUND]):
+    call_mechanism(A, M, C, P, Y, state, TASK_MEAN_VELOCITIES)
+    deepest = A.real.overrun if state.addresses.mechanism != 0 else 0.0
+    for c in range(C.count.found):
         u = contact_velocity(P, Y.v, Y.wide, c)
-        gap = C.x[c, GAP] + h * u[0]
-        if now[c, HISTORY_STIFFNESS] > 0.0:
+        gap = C.x.gap[c] + h * u[0]
+        if now.stiffness[c] > 0.0:
             gap = remaining_gap(now, c, gap)
         else:
-            pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
-        deepest = min(deepest, -abs(gap) if now[c, HISTORY_PERSISTS] == MIDDLE_FOUND else gap)
+            state.worst.overlap = min(state.worst.overlap, C.x.gap[c])
+        deepest = min(deepest, -abs(gap) if now.persistence[c] == MIDDLE_FOUND else gap)
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
-        account_contact(P, X, c, u, pace, now)
+        account_contact(P, X, c, u, state, now)
         if P.turn.shape[0] > 0:
-            account_rolling(P, X, Y, c, pace, now)
+            account_rolling(P, X, Y, c, state, now)
         for i in range(3):
             Y.p[c, i] = 0.0
-    if pace.count[STEPS_TAKEN] == 0:
-        pace.real[OVERLAP_AT_START] = pace.real[WORST_OVERLAP]
+    if state.counts.steps_taken == 0:
+        state.worst.overlap_at_start = state.worst.overlap
     clear_velocities(Y)
-    if deepest < -pace.real[NO_OVERLAP_BELOW]:
+    if deepest < -state.tolerances.overlap:
         preload_displacements(C, P, X, Y, now)
-        Q.size[0] = C.count[FOUND]
+        Q.size[0] = C.count.found
         solve_cone_problem(
-            pace.door[ADDRESS_POSITIONS],
+            state.addresses.positions,
             Q,
             Y,
             W,
             O,
             F.positions,
-            pace,
-            pace.count[POSITION_ITERATIONS],
-            pace.real[POSITION_TOLERANCE],
+            state,
+            state.options.position_iterations,
+            state.tolerances.position,
         )
-    if pace.count[COMPLIANT] != 0:
-        store_elastic_energy(G, C, P, L, X, Y, pace, now)
+    if state.options.compliant != 0:
+        store_elastic_energy(G, C, P, L, X, Y, state, now)
 
 
 @formula
@@ -338,57 +291,50 @@ def preload_displacements(C, P, X, Y, now):
     """Start displacements of persistent contacts from their impulses, so that gaps close as far as these contacts
     press.
     """
-    for c in range(C.count[FOUND]):
-        if now[c, HISTORY_PERSISTS] == MIDDLE_FOUND:
+    for c in range(C.count.found):
+        if now.persistence[c] == MIDDLE_FOUND:
             apply_contact_impulse(P, Y.v, Y.wide, c, (-X.p[c, 0], 0.0, 0.0))
             Y.p[c, 0] = X.p[c, 0]
 
 
 @formula
-def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
+def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, now):
     """End the mechanism's step on its joints, and repeat displacements where that made contacts overlap. Returns a
     status.
     """
     for n in range(LIFT_PASSES + 1):
-        if call_mechanism(A, M, C, P, Y, pace, TASK_FINISH) != DONE:
+        if call_mechanism(A, M, C, P, Y, state, TASK_FINISH) != DONE:
             return NO_SOLUTION
-        if pace.door[ADDRESS_MECHANISM] == 0 or pace.count[COMPLIANT] != 0 or n == LIFT_PASSES:
+        if state.addresses.mechanism == 0 or state.options.compliant != 0 or n == LIFT_PASSES:
             break
-        if not overlaps_after_joints(G, A, M, C, P, Q, Y, R.bias, pace):
+        if not overlaps_after_joints(G, A, M, C, P, Q, Y, R.bias, state):
             break
         clear_velocities(Y)
         preload_displacements(C, P, X, Y, now)
         solve_cone_problem(
-            pace.door[ADDRESS_POSITIONS],
+            state.addresses.positions,
             Q,
             Y,
             W,
             O,
             F.positions,
-            pace,
-            pace.count[POSITION_ITERATIONS],
-            pace.real[POSITION_TOLERANCE],
+            state,
+            state.options.position_iterations,
+            state.tolerances.position,
         )
     return DONE
 
 
 @formula
-def energies_and_counts(A, pace):
+def energies_and_counts(A, state):
     """Return the energies exchanged by contacts, stops and joints so far, numerical losses, and counts of impacts."""
-    real, count = pace.real, pace.count
-    energies = (
-        real[LOST_IMPACT],
-        real[LOST_FRICTION],
-        real[GIVEN_BY_SURFACES],
-        real[NUMERICAL],
-        A.real.lost,
-        A.real.astray,
-    )
-    return energies, (count[IMPACTS], count[REDUCED_EXPANSIONS], count[ENDLESS_IMPACTS])
+    s, n = state.sums, state.counts
+    energies = (s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.astray)
+    return energies, (n.impacts, n.reduced_expansions, n.endless_impacts)
 
 
 @formula
-def restore_start(N, M, A, X, pace, sums):
+def restore_start(N, M, A, X, state, sums):
     """Restore poses, velocities, energies and counts at the start of the step, before its impacts."""
     restore_poses(N, M)
     for k in range(N.body.shape[0]):
@@ -396,58 +342,56 @@ def restore_start(N, M, A, X, pace, sums):
             X.v[k, i] = N.start[k, 12 + i]
     for d in range(X.wide.shape[0]):
         X.wide[d] = A.clock.y[1, A.S.sizes.coordinates + d]
-    for r in range(A.lam.shape[1]):
-        A.lam[2, r] = 0.0
-    real, count = pace.real, pace.count
+    for r in range(A.reactions.smooth.shape[0]):
+        A.reactions.impact[r] = 0.0
+    s, n = state.sums, state.counts
     energies, counts = sums
-    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN_BY_SURFACES], real[NUMERICAL], A.real.lost, A.real.astray = (
-        energies
-    )
-    count[IMPACTS], count[REDUCED_EXPANSIONS], count[ENDLESS_IMPACTS] = counts
+    s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.astray = energies
+    n.impacts, n.reduced_expansions, n.endless_impacts = counts
 
 
 @formula
-def search_again(G, M, C, H, B, Z, pace, now):
+def search_again(G, M, C, H, B, Z, state, now):
     """Search for contacts with the velocities after impacts. Returns a status.
 
     A contact that had an impact and has disappeared, or has another normal or point, is kept: its impulse acts where it
     did.
     """
-    status, most = call(pace.door[ADDRESS_SEARCH], G, M, H, C, B, NEW_VELOCITIES), H.at.shape[0]
-    n = H.count[FOUND]
+    status, most = call(state.addresses.search, G, M, H, C, B, NEW_VELOCITIES), H.at.shape[0]
+    n = H.count.found
     if status != DONE:
-        C.count[FOUND] = n
+        C.count.found = n
         return status
-    C.count[NUMBER] = H.count[NUMBER]
+    C.count.number = H.count.number
     for k in range(n):
-        o = H.at[k, BEFORE]
+        o = H.at.before[k]
         same = o >= 0 and not (had_impact(now, o) and contact_moved(C, o, H, k))
-        store3(Z.p, k, 0, load3(now, o, HISTORY_IMPACT_IMPULSE) if same else (0.0, 0.0, 0.0))
+        store3(Z.p, k, 0, load3(now.impact_impulse, o, 0) if same else (0.0, 0.0, 0.0))
         if same:
-            now[o, HISTORY_HIT] = -1.0
+            now.hit[o] = -1.0
         if o >= 0:
-            H.at[k, BEFORE] = C.at[o, BEFORE]
-    for o in range(C.count[FOUND]):
-        if had_impact(now, o) and now[o, HISTORY_HIT] >= 0.0:
+            H.at.before[k] = C.at.before[o]
+    for o in range(C.count.found):
+        if had_impact(now, o) and now.hit[o] >= 0.0:
             if n < most:
-                store3(Z.p, n, 0, load3(now, o, HISTORY_IMPACT_IMPULSE))
+                store3(Z.p, n, 0, load3(now.impact_impulse, o, 0))
                 copy_contact(C, o, H, n)
-                H.at[n, BEFORE] = -1
+                H.at.before[n] = -1
             n += 1
     if n > most:
-        C.count[FOUND] = n
+        C.count.found = n
         return FULL_CONTACTS
     for k in range(n):
         copy_contact(H, k, C, k)
-        store3(now, k, HISTORY_IMPACT_IMPULSE, load3(Z.p, k, 0))
-    C.count[FOUND] = n
+        store3(now.impact_impulse, k, 0, load3(Z.p, k, 0))
+    C.count.found = n
     return DONE
 
 
 @formula
 def contact_moved(C, o, H, k):
     """Return whether contact k of H has another normal or point than contact o of C."""
-    return load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL) or load3(C.x, o, POINT) != load3(H.x, k, POINT)
+    return load3(C.x.normal, o, 0) != load3(H.x.normal, k, 0) or load3(C.x.point, o, 0) != load3(H.x.point, k, 0)
 
 
 @formula
@@ -460,107 +404,109 @@ def copy_contact(C, c, H, k):
 
 
 @formula
-def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now):
+def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, now):
     """Resolve impacts repeatedly, since one impact may cause others nearby. Returns a status."""
     clear_impact_impulses(C, now)
     for _ in range(IMPACT_ROUNDS):
-        if not find_impacts(G, C, P.at, P.bias, R, X, L, pace, now):
+        if not find_impacts(G, C, P.at, P.bias, R, X, L, state, now):
             return DONE
-        if pace.door[ADDRESS_MECHANISM] != 0:
-            call_mechanism(A, M, C, P, X, pace, TASK_CONSISTENT)
-            find_impacts(G, C, P.at, P.bias, R, X, L, pace, now)
-        resolve_impacts(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now)
-        call_mechanism(A, M, C, P, Z, pace, TASK_IMPACT_IMPULSES)
-        if free_velocities_of_all(A, M, C, P, X, N, pace) != DONE:
+        if state.addresses.mechanism != 0:
+            call_mechanism(A, M, C, P, X, state, TASK_CONSISTENT)
+            find_impacts(G, C, P.at, P.bias, R, X, L, state, now)
+        resolve_impacts(G, C, P.bias, R, Z, E, X, W, O, F, L, state, now)
+        call_mechanism(A, M, C, P, Z, state, TASK_IMPACT_IMPULSES)
+        if free_velocities_of_all(A, M, C, P, X, N, state) != DONE:
             return NO_SOLUTION
-        status = search_again(G, M, C, H, B, Z, pace, now)
+        status = search_again(G, M, C, H, B, Z, state, now)
         if status != DONE:
             return status
-        fill_rows(G, M, C, P, L, pace)
-        if call_mechanism(A, M, C, P, X, pace, TASK_ROWS) != DONE:
+        fill_rows(G, M, C, P, L, state)
+        if call_mechanism(A, M, C, P, X, state, TASK_ROWS) != DONE:
             return TABLES_FULL
-    pace.count[ENDLESS_IMPACTS] += 1
+    state.counts.endless_impacts += 1
     return DONE
 
 
 @formula
-def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
+def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, state, now, before, hit):
     """Set the rows of persistent contacts in the middle of the step; see `contact_constraints`. Returns a status.
 
     hit: whether there were impacts.
     """
-    if not find_persistent_contacts(G, M, C, D, N, P, X, L, pace, now, before, (A.count.first, hit)):
+    if not find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, (A.count.first, hit)):
         return DONE
-    move_half_step(N, M, X, pace.real[STEP])
-    call_mechanism(A, M, C, P, X, pace, TASK_POSES)
-    status = call(pace.door[ADDRESS_SEARCH], G, M, H, C, B, MIDWAY)
+    move_half_step(N, M, X, state.times.step)
+    call_mechanism(A, M, C, P, X, state, TASK_POSES)
+    status = call(state.addresses.search, G, M, H, C, B, MIDWAY)
     found = status == DONE and middle_rows(G, M, C, H, P, L, now)
     restore_poses(N, M)
     if status != DONE:
-        C.count[FOUND] = H.count[FOUND]
+        C.count.found = H.count.found
         return status
     if found:
-        for c in range(C.count[FOUND]):
+        for c in range(C.count.found):
             P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
-        call_mechanism(A, M, C, P, X, pace, TASK_ROWS)
+        call_mechanism(A, M, C, P, X, state, TASK_ROWS)
         bias_persistent_contacts(G, M, C, P, X, now, before)
     return DONE
 
 
 @formula
-def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before):
     """Take one time step; if it fails, the state at its start is restored. Returns a status."""
     save_start(N, M, X)
-    sums = energies_and_counts(A, pace)
-    status = attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before)
+    sums = energies_and_counts(A, state)
+    status = attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before)
     if status != DONE:
-        restore_start(N, M, A, X, pace, sums)
+        restore_start(N, M, A, X, state, sums)
     return status
 
 
 @formula
-def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before):
     """Compute impacts, velocities and displacements for `take_step`. Returns a status."""
-    if free_velocities_of_all(A, M, C, P, X, N, pace) != DONE:
+    if free_velocities_of_all(A, M, C, P, X, N, state) != DONE:
         return NO_SOLUTION
-    B.real[AHEAD] = pace.real[STEP]
-    status = call(pace.door[ADDRESS_SEARCH], G, M, C, D, B, STEP_ON)
+    B.real.ahead = state.times.step
+    status = call(state.addresses.search, G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
-    fill_rows(G, M, C, P, L, pace)
-    if call_mechanism(A, M, C, P, X, pace, TASK_ROWS) != DONE:
+    fill_rows(G, M, C, P, L, state)
+    if call_mechanism(A, M, C, P, X, state, TASK_ROWS) != DONE:
         return TABLES_FULL
-    before_impacts = pace.count[IMPACTS]
-    status = resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now)
+    before_impacts = state.counts.impacts
+    status = resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, now)
     if status != DONE:
         return status
-    status = continue_contacts(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, pace.count[IMPACTS] > before_impacts)
+    status = continue_contacts(
+        G, A, M, C, D, H, B, N, P, X, L, state, now, before, state.counts.impacts > before_impacts
+    )
     if status != DONE:
         return status
-    status = solve_velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
+    status = solve_velocities(G, A, C, P, X, W, O, F, N, M, L, state, now, before)
     if status != DONE:
         return status
-    solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
-    if finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now) != DONE:
+    solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now)
+    if finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, now) != DONE:
         return NO_SOLUTION
-    displace_bodies(N, M, X, Y.v, pace)
-    call_mechanism(A, M, C, P, X, pace, VELOCITIES_AFTER)
-    pace.real[TIME] += pace.real[STEP]
-    pace.real[LAST_STEP] = pace.real[STEP]
-    pace.count[STEPS_TAKEN] += 1
-    pace.count[STEPS_LEFT] -= 1
-    pace.count[MOST_CONTACTS] = max(pace.count[MOST_CONTACTS], C.count[FOUND])
+    displace_bodies(N, M, X, Y.v, state)
+    call_mechanism(A, M, C, P, X, state, VELOCITIES_AFTER)
+    state.times.now += state.times.step
+    state.times.last_step = state.times.step
+    state.counts.steps_taken += 1
+    state.counts.steps_left -= 1
+    state.counts.most_contacts = max(state.counts.most_contacts, C.count.found)
     return DONE
 
 
 @formula
-def run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+def run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U):
     """Run the steps; see `step_loop_kernel`."""
-    while pace.count[STEPS_LEFT] > 0:
-        if pace.count[STEPS_TAKEN] % 2 == 0:
-            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
+    while state.counts.steps_left > 0:
+        if state.counts.steps_taken % 2 == 0:
+            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T.kept, U.kept)
         else:
-            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
+            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, U.kept, T.kept)
         if status != DONE:
             return status
     return DONE
@@ -587,11 +533,11 @@ def step_loop_kernel(
     F: StepSolvers,
     N: FreeBodies,
     L: Surfaces,
-    pace: RunState,
+    state: RunState,
     T: ContactHistory,
     U: ContactHistory,
 ) -> int:
-    """Take ``pace.count[STEPS_LEFT]`` steps. Returns a status: of the contact search, TABLES_FULL, NO_SOLUTION or
+    """Take ``state.counts.steps_left`` steps. Returns a status: of the contact search, TABLES_FULL, NO_SOLUTION or
     STEP_TOO_LONG.
     """
-    return run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U)
+    return run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U)

@@ -14,6 +14,7 @@ from ...numerics.complementarity.contact_problem import (
     ContactProblem,
     ContactState,
     ContactWorkspace,
+    Nodes,
     SolverSettings,
     allocate_solver,
     empty_problem,
@@ -23,27 +24,15 @@ from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
 from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
 from .stepping_tables import (
-    ADDRESS_MECHANISM,
-    ADDRESS_SEARCH,
-    DIVIDES_STEPS,
-    FREE_INERTIA,
-    FREE_INVERSE,
-    FREE_MASS,
-    FREE_PER_MASS,
-    FREE_ROUND,
-    GRAVITY,
-    HISTORY_COLUMNS,
-    LONGEST_STEP,
     NO_SOLUTION,
-    STEP,
     STEP_TOO_LONG,
-    STEPS_LEFT,
-    STEPS_TAKEN,
     TABLES_FULL,
     TASK_START,
-    VELOCITY_TOLERANCE,
     ContactHistory,
+    ContactMemory,
     FreeBodies,
+    FreeBodyNumbers,
+    Jobs,
     MechanismTables,
     RunState,
     no_mechanism,
@@ -87,10 +76,10 @@ class StepWorkspaces:
 
 def make_workspaces(
     contacts: int,
-    node: np.ndarray,
+    node: Nodes,
     turning: bool,
     A: MechanismTables,
-    pace: RunState,
+    state: RunState,
     solver: str,
     old: StepWorkspaces | None = None,
 ) -> StepWorkspaces:
@@ -107,8 +96,8 @@ def make_workspaces(
         X.v[:], X.wide[:] = old.X.v, old.X.wide
         O = old.O
     Z = allocate_solver(P)[0]._replace(v=X.v, wide=X.wide)
-    F = bind_solvers(solver, (P, Q, R), X, W, O, pace)
-    kept = [np.zeros((contacts, HISTORY_COLUMNS)) for _ in range(2)]
+    F = bind_solvers(solver, (P, Q, R), X, W, O, state)
+    kept = [ContactMemory.blank(contacts) for _ in range(2)]
     if old is not None:
         for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
             a[: len(b)] = b
@@ -129,26 +118,25 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
     planar : bool
     """
     n = len(mass)
-    body = np.zeros((n, 16))
-    body[:, FREE_MASS], body[:, FREE_PER_MASS] = mass, 1.0 / mass
+    body = FreeBodyNumbers.blank(n)
+    body.mass[:], body.inverse_mass[:] = mass, 1.0 / mass
     if planar:  # torques act about z only: an isotropic inertia is equivalent
         inertia = inertia[:, 2, 2, None, None] * np.eye(3)
     inverse = np.linalg.inv(inertia)
-    for first, J in ((FREE_INERTIA, inertia), (FREE_INVERSE, inverse)):
+    for packed, J in ((body.inertia, inertia), (body.inverse_inertia, inverse)):
         for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-            body[:, first + k] = J[:, i, j]
+            packed[:, k] = J[:, i, j]
     size = np.trace(inertia, axis1=1, axis2=2) / 3.0
     odd = np.abs(inertia - size[:, None, None] * np.eye(3)).max(axis=(1, 2), initial=0.0)
-    body[:, FREE_ROUND] = odd <= 1e-12 * size
-    return FreeBodies(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)), np.zeros((n, 18)))
+    body.isotropic[:] = odd <= 1e-12 * size
+    return FreeBodies(body, turn.copy(), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros(n), np.zeros((n, 18)))
 
 
-def problem_nodes(free: FreeBodies) -> np.ndarray:
+def problem_nodes(free: FreeBodies) -> Nodes:
     """Return the nodes of the cone problem; those of bodies with anisotropic inertia are filled in every step."""
-    out = np.zeros((len(free.body), 8))
-    out[:, 0] = free.body[:, FREE_PER_MASS]
-    out[:, 1:7] = free.body[:, FREE_INVERSE : FREE_INVERSE + 6]
-    out[:, 7] = free.body[:, FREE_ROUND]
+    out: Nodes = Nodes.blank(len(free.body))
+    out.inverse_mass, out.inverse_inertia = free.body.inverse_mass, free.body.inverse_inertia
+    out.isotropic = free.body.isotropic
     return out
 
 
@@ -165,7 +153,7 @@ class Stepper:
     velocity : (n, 6) [m/s, rad/s]
         Of the mass centres, and angular velocities, in world axes.
     laws : Surfaces
-    pace : RunState
+    state : RunState
         With time, options and the solvers' addresses; the address of the contact search is set here.
     margin : float [m]
         Gap up to which non-approaching shapes are in contact.
@@ -182,13 +170,13 @@ class Stepper:
         position: np.ndarray,
         velocity: np.ndarray,
         laws: Surfaces,
-        pace: RunState,
+        state: RunState,
         margin: float,
         solver: str = "auto",
         joints: MechanismTables | None = None,
     ) -> None:
         n = len(free.body)
-        self.geometry, self.laws, self.pace = geometry, laws, pace
+        self.geometry, self.laws, self.state = geometry, laws, state
         self.joints = no_mechanism() if joints is None else joints
         count = n + len(self.joints.mover)
         self.free = free._replace(start=np.zeros((count, 18)))
@@ -200,13 +188,13 @@ class Stepper:
         turning = bool((laws.pair[..., 3:5] > 0.0).any())
         self.solver = solver
         self.workspaces = make_workspaces(
-            len(self.finder.now.at), problem_nodes(free), turning, self.joints, pace, solver
+            len(self.finder.now.at), problem_nodes(free), turning, self.joints, state, solver
         )
         self.workspaces.X.v[:, :6] = velocity
         self.turning = turning
         self.quota = 1
         self.enough = float(
-            pace.real[VELOCITY_TOLERANCE]
+            state.tolerances.velocity
         )  # allowed residual of velocities [m/s] in a step that is not very short
         self.halved = 0  # steps that were divided
         if joints is not None:
@@ -215,7 +203,7 @@ class Stepper:
     def _start_joints(self) -> None:
         """Evaluate the mechanism at its start."""
         self.joints.door[0] = engine.address
-        self.pace.door[ADDRESS_MECHANISM] = mechanism_kernel.address
+        self.state.addresses.mechanism = mechanism_kernel.address
         if (
             mechanism_kernel(
                 self.joints, self.movers, self.finder.now, self.workspaces.P, self.workspaces.X, TASK_START
@@ -227,7 +215,7 @@ class Stepper:
     def run(self, steps: int, h: float) -> None:
         """Take as many steps of h seconds, in calls short enough for keyboard interrupts.
 
-        A step without solution is divided; ``pace.real[STEP]`` is the length of the last one.
+        A step without solution is divided; ``state.times.step`` is the length of the last one.
 
         Raises
         ------
@@ -236,21 +224,21 @@ class Stepper:
         NoSolution
             If shorter steps have no solution either.
         """
-        count = self.pace.count
+        counts = self.state.counts
         while steps > 0:
             began = time.perf_counter()
-            asked = count[STEPS_LEFT] = min(steps, self.quota)
-            self.pace.real[LONGEST_STEP] = h
+            asked = counts.steps_left = min(steps, self.quota)
+            self.state.times.longest_step = h
             self._set_step(h)
             try:
                 self._call_loop()
             except (NoSolution, StepTooLong) as reason:
-                left = int(count[STEPS_LEFT])
+                left = int(counts.steps_left)
                 stuck = isinstance(reason, NoSolution)
                 self._halve_step(h, MOST_HALVINGS if stuck else MOST_IMPACT_HALVINGS)
                 self.halved += stuck
-                count[STEPS_LEFT] = left - 1
-            steps -= int(asked - count[STEPS_LEFT])
+                counts.steps_left = left - 1
+            steps -= int(asked - counts.steps_left)
             took = max(time.perf_counter() - began, 1e-6)
             self.quota = int(max(1, min(4 * self.quota, self.quota * CALL_SECONDS / took, MOST_STEPS_PER_CALL)))
 
@@ -259,36 +247,36 @@ class Stepper:
 
         In a step so short that gravity causes less velocity than that residual, resting bodies would not be supported.
         """
-        real = self.pace.real
-        falls = REST_SHARE * h * float(np.linalg.norm(real[GRAVITY : GRAVITY + 3]))
-        real[STEP], real[VELOCITY_TOLERANCE] = h, min(self.enough, falls) if falls > 0.0 else self.enough
+        state = self.state
+        falls = REST_SHARE * h * float(np.linalg.norm(state.gravity))
+        state.times.step, state.tolerances.velocity = h, min(self.enough, falls) if falls > 0.0 else self.enough
 
     def _halve_step(self, h: float, depth: int) -> None:
         """Take a step of h, which has no solution, as two; at the last depth without requiring convergence."""
         if depth == 0:
             raise NoSolution
-        divides = int(self.pace.count[DIVIDES_STEPS])
+        divides = int(self.state.options.divides_steps)
         for _ in range(2):
             self._set_step(0.5 * h)
-            self.pace.count[STEPS_LEFT] = 1
+            self.state.counts.steps_left = 1
             self.joints.count.accept_unsettled = depth == 1
-            self.pace.count[DIVIDES_STEPS] = divides and depth > 1
+            self.state.options.divides_steps = divides and depth > 1
             try:
                 self._call_loop()
             except (NoSolution, StepTooLong):
                 self._halve_step(0.5 * h, depth - 1)
         self.joints.count.accept_unsettled = 0
-        self.pace.count[DIVIDES_STEPS] = divides
+        self.state.options.divides_steps = divides
 
     def _call_loop(self) -> None:
-        """Take ``pace.count[STEPS_LEFT]`` steps, enlarging tables that are full."""
-        self.pace.door[ADDRESS_SEARCH] = self.finder.address
+        """Take ``state.counts.steps_left`` steps, enlarging tables that are full."""
+        self.state.addresses.search = self.finder.address
         while True:
             r, f = self.workspaces, self.finder
             a, b = f.now, f.before
             status = step_loop_kernel(
                 self.geometry, self.joints, self.movers, a, b, f.midway, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E,
-                r.W, r.O, r.F, self.free, self.laws, self.pace, r.T, r.U,
+                r.W, r.O, r.F, self.free, self.laws, self.state, r.T, r.U,
             )  # fmt: skip
             if status == DONE:
                 return
@@ -299,7 +287,7 @@ class Stepper:
             if status == TABLES_FULL:
                 self._enlarge_row_tables()
                 continue
-            f.enlarge(status, (a if self.pace.count[STEPS_TAKEN] % 2 == 0 else b).count)
+            f.enlarge(status, (a if self.state.counts.steps_taken % 2 == 0 else b).count)
             if len(f.now.at) > len(r.P.mu):
                 self.workspaces = self._enlarged_workspaces(len(f.now.at))
 
@@ -307,16 +295,16 @@ class Stepper:
         """Enlarge the tables for rows of contacts on the mechanism."""
         A = self.joints
         A.count.needed = int(GROWTH_FACTOR * A.count.needed)
-        self.joints = A._replace(job=np.zeros((int(GROWTH_FACTOR * A.count.jobs) + 1, 3), np.int64))
+        self.joints = A._replace(job=Jobs.blank(int(GROWTH_FACTOR * A.count.jobs) + 1))
         self.workspaces = self._enlarged_workspaces(len(self.workspaces.P.mu))
 
     def _enlarged_workspaces(self, contacts: int) -> StepWorkspaces:
         """Return workspaces for this number of contacts that continue from the present ones."""
         r = self.workspaces
-        return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.pace, self.solver, r)
+        return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.state, self.solver, r)
 
-    def last(self) -> tuple[Contacts, np.ndarray]:
+    def last(self) -> tuple[Contacts, ContactMemory]:
         """Return the contacts of the last step, and their history."""
-        if self.pace.count[STEPS_TAKEN] % 2 == 1:
+        if self.state.counts.steps_taken % 2 == 1:
             return self.finder.now, self.workspaces.T.kept
         return self.finder.before, self.workspaces.U.kept

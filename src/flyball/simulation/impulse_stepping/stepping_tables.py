@@ -12,115 +12,172 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...compiler.struct_layout import Float1, Float2, Int1, Int2, Record, RecordLayout, Struct, struct_layout
+from ...compiler.struct_layout import (
+    Column,
+    Float1,
+    Float2,
+    Int1,
+    Int2,
+    Record,
+    RecordLayout,
+    Struct,
+    Vector3,
+    Vector6,
+    struct_layout,
+)
 from ...engine.calls import OutputBuffer
 from ...numerics.integrators.butcher_tableaux import Tableau
 from ...numerics.integrators.time_loop import StepState
 from ...tables.table_definitions import System, Work
 
-# columns of FreeBodies.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy
-# zz xy xz yz), 1 if the inertia is the same about every axis
-FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
-ANGLE = 6  # column of FreeBodies.move after velocities: rotation [rad] about z since the start, if inertia is isotropic
-# columns of ContactHistory.kept: impulse in world axes; 1 if sliding, 0 if sticking, -1 without force; whether it has
-# an impact, the impact's impulse in world axes, and the velocities before it; of compliant contacts: stiffness (0:
-# rigid), overlap and its rate at the start of the step, implicit share s, overlap of the law and gap at the end, part
-# of the overlap that stores elastic energy; torque impulse in world axes; relative angular velocity before an impact;
-# part of the bias that is no velocity of a surface or gap; relative velocity at the start of the step, in world axes;
-# whether it is persistent: 0 no, PRESSES (it pressed in the step before and is at rest along the normal), MIDDLE_WANTED
-# (its rows are also needed in the middle of the step), MIDDLE_FOUND (they were found, and its bias is that of the mean)
-HISTORY_IMPULSE, HISTORY_SLIDING, HISTORY_HIT, HISTORY_IMPACT_IMPULSE, HISTORY_IMPACT_VELOCITY = 0, 3, 4, 5, 8
-(
-    HISTORY_STIFFNESS,
-    HISTORY_OVERLAP,
-    HISTORY_OVERLAP_RATE,
-    HISTORY_SHARE,
-    HISTORY_LAW_OVERLAP,
-    HISTORY_END_GAP,
-    HISTORY_SPRING_OVERLAP,
-) = range(11, 18)
-HISTORY_TORQUE, HISTORY_IMPACT_SPIN, HISTORY_MIDDLE_BIAS, HISTORY_START_VELOCITY, HISTORY_PERSISTS = 18, 21, 24, 27, 30
-HISTORY_COLUMNS = 31  # columns
-PRESSES, MIDDLE_WANTED, MIDDLE_FOUND = 1.0, 2.0, 3.0  # ContactHistory.kept[:, HISTORY_PERSISTS]
-# entries of RunState.real: time, step; gravity; speed below which nothing bounces; negligible overlap [m]; allowed
-# residual [m/s] of velocities and of positions; residual over the step [m/s^2] above which an unconverged solve is
-# reported
-TIME, STEP, GRAVITY, NO_BOUNCE_BELOW, NO_OVERLAP_BELOW, VELOCITY_TOLERANCE, POSITION_TOLERANCE, REPORTED_RESIDUAL = (
-    0,
-    1,
-    2,
-    5,
-    6,
-    7,
-    8,
-    9,
-)
-# ... and sums: work lost in friction and in impacts, work supplied by moving surfaces; largest overlap and residuals,
-# time of the largest residual, overlap at the start
-(
-    LOST_FRICTION,
-    LOST_IMPACT,
-    GIVEN_BY_SURFACES,
-    WORST_OVERLAP,
-    WORST_RESIDUAL,
-    WORST_FORCE,
-    WORST_AT,
-    OVERLAP_AT_START,
-) = range(10, 18)
-STORED_ENERGY, STORED_AT_START = 18, 19  # energy in compliant contacts: now, and at the start
-LAST_STEP = 20  # the step before, 0 if there was none
-NUMERICAL = 21  # energy lost numerically: rows that change within a step, displacements out of overlaps, damping
-LONGEST_STEP = 22  # the undivided step
-LAST_RESIDUAL = 23  # residual [m/s] of the last solve for velocities
-REALS = 24
-# entries of RunState.count: steps still to take, steps taken; largest number of iterations for velocities and
-# positions; law of restitution; iterations done, unconverged solves, largest number of contacts; number of impacts, and
-# of those with reduced expansion; whether impacts are sequential; whether there may be compliant contacts, and whether
-# a step that is too long for their impacts is divided; steps whose impacts did not end
-(
-    STEPS_LEFT,
-    STEPS_TAKEN,
-    VELOCITY_ITERATIONS,
-    POSITION_ITERATIONS,
-    RESTITUTION_LAW,
-    ITERATIONS,
-    UNCONVERGED,
-    MOST_CONTACTS,
-    IMPACTS,
-    REDUCED_EXPANSIONS,
-    SEQUENTIAL,
-    COMPLIANT,
-) = range(12)
-DIVIDES_STEPS, ENDLESS_IMPACTS = 12, 13
-COUNTS = 16
-# entries of RunState.door: addresses of the contact search, of the solvers of velocities, positions, impacts, and of
-# the mechanism (0: there is none)
-ADDRESS_SEARCH, ADDRESS_VELOCITIES, ADDRESS_POSITIONS, ADDRESS_IMPACTS, ADDRESS_MECHANISM = range(5)
-NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # RunState.count[RESTITUTION_LAW]
+PRESSES, MIDDLE_WANTED, MIDDLE_FOUND = 1.0, 2.0, 3.0  # ContactMemory.persistence
+NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # RunOptions.restitution_law
+
+
+class FreeBodyNumbers(Record, kind="Float", rows=True):
+    """Masses of the free bodies; about the mass centre, in body axes (xx yy zz xy xz yz)."""
+
+    mass: Column
+    inverse_mass: Column
+    inertia: Vector6
+    inverse_inertia: Vector6
+    isotropic: Column  # 1 if the inertia is the same about every axis
 
 
 class FreeBodies(NamedTuple):
     """Bodies on which only gravity and contact act."""
 
-    body: Float2  # (n, 16)
+    body: FreeBodyNumbers
     turn: Float2  # (n, 4): unit quaternion, body axes to the world
-    before: Float2  # (n, 8): velocities at the start of the step
-    move: Float2  # (n, 8): displacement velocities
+    before: Float2  # (n, 6): velocities at the start of the step
+    move: Float2  # (n, 6): displacement velocities
+    angle: Float1  # (n,): rotation [rad] about z since the start, if the inertia is isotropic
     start: Float2  # (movers, 18): poses of all movers at the start of the step, and twists
+
+
+class ContactMemory(Record, kind="Float", rows=True):
+    """Data of each contact that the next step reads; vectors in world axes."""
+
+    impulse: Vector3
+    sliding: Column  # 1 if sliding, 0 if sticking, -1 without force
+    hit: Column  # whether it has an impact
+    impact_impulse: Vector3
+    impact_velocity: Vector3  # before the impact
+    stiffness: Column  # of compliant contacts; 0: rigid
+    overlap: Column  # at the start of the step
+    overlap_rate: Column
+    implicit_share: Column
+    law_overlap: Column  # of the law, at the end
+    end_gap: Column
+    spring_overlap: Column  # part of the overlap that stores elastic energy
+    torque: Vector3  # impulse
+    impact_spin: Vector3  # relative angular velocity before an impact
+    middle_bias: Vector3  # part of the bias that is no velocity of a surface or gap
+    start_velocity: Vector3  # relative velocity at the start of the step
+    persistence: Column  # 0 no, PRESSES (it pressed in the step before and is at rest along the normal), MIDDLE_WANTED
+    # (its rows are also needed in the middle of the step), MIDDLE_FOUND (they were found, its bias is that of the mean)
 
 
 class ContactHistory(NamedTuple):
     """Stored data of each contact; one for each of the two tables of contacts."""
 
-    kept: Float2  # (capacity, HISTORY_COLUMNS)
+    kept: ContactMemory
+
+
+class RunTimes(Record, kind="Float"):
+    """Times of a run [s]."""
+
+    now: float
+    step: float
+    last_step: float  # the step before, 0 if there was none
+    longest_step: float  # the undivided step
+
+
+class RunTolerances(Record, kind="Float"):
+    """What counts as nothing."""
+
+    rebound_speed: float  # speed below which nothing bounces [m/s]
+    overlap: float  # negligible overlap [m]
+    velocity: float  # allowed residual of velocities [m/s]
+    position: float  # allowed residual of displacements over a step [m/s]
+    reported: float  # residual over the step above which an unconverged solve is reported [m/s^2]
+
+
+class RunSums(Record, kind="Float"):
+    """Energies since the start [J], in the order of `results.energy.EXCHANGE_SIGNS`."""
+
+    friction_loss: float
+    impact_loss: float
+    surface_work: float  # supplied by moving surfaces
+    numerical_loss: float  # rows that change within a step, displacements out of overlaps, damping
+    elastic_energy: float  # now stored in compliant contacts
+    elastic_at_start: float  # stored there at the start
+
+
+class RunExtremes(Record, kind="Float"):
+    """Largest errors of a run."""
+
+    overlap: float  # gap (< 0) [m]
+    overlap_at_start: float  # [m]
+    residual: float  # of velocities [m/s]
+    force_residual: float
+    time: float  # of the largest residual [s]
+    last_residual: float  # of the last solve for velocities [m/s]
+
+
+class RunOptions(Record, kind="Int"):
+    """Options of a run."""
+
+    velocity_iterations: int  # largest number
+    position_iterations: int
+    restitution_law: int
+    sequential: int  # whether impacts are sequential
+    compliant: int  # whether there may be compliant contacts
+    divides_steps: int  # whether a step that is too long for their impacts is divided
+
+
+class RunCounts(Record, kind="Int"):
+    """Counters of a run."""
+
+    steps_left: int
+    steps_taken: int
+    iterations: int
+    unconverged: int  # solves
+    most_contacts: int
+    impacts: int
+    reduced_expansions: int
+    endless_impacts: int  # steps whose impacts did not end
+
+
+class RunAddresses(Record, kind="Int"):
+    """Addresses of kernels."""
+
+    search: int
+    velocities: int
+    positions: int
+    impacts: int
+    mechanism: int  # 0: there is none
 
 
 class RunState(NamedTuple):
-    """Time, options and sums of a run."""
+    """Times, options and sums of a run."""
 
-    real: Float1  # (REALS,)
-    count: Int1  # type: ignore[assignment]  # (COUNTS,)
-    door: Int1  # (8,)
+    gravity: Float1  # (3,) [m/s^2]
+    times: RunTimes
+    tolerances: RunTolerances
+    sums: RunSums
+    worst: RunExtremes
+    options: RunOptions
+    counts: RunCounts
+    addresses: RunAddresses
+
+
+def initial_run_state(gravity: np.ndarray) -> RunState:
+    """Return the state of a run in which nothing is set but gravity."""
+    return RunState(
+        np.array(gravity, float), RunTimes.blank(), RunTolerances.blank(), RunSums.blank(), RunExtremes.blank(),
+        RunOptions.blank(), RunCounts.blank(), RunAddresses.blank(),
+    )  # fmt: skip
 
 
 # tasks of `mechanism_step.mechanism_kernel`, in the order of a step (``wide`` is `ContactState.wide`):
@@ -144,35 +201,7 @@ class RunState(NamedTuple):
     TASK_POSES,
     TASK_CONSISTENT,
 ) = range(11)
-# rows of MechanismTables.wide: velocities at the start of the step; the present iterate of their change without
-# contact impulses, that change from the evaluation at half of it, and the drivers' efforts there; generalised impulses
-# of contacts and single rows, and the change by them; velocities at the end; displacement (also scratch)
-V_BEFORE, V_CHANGE, V_SMOOTH, EFFORTS, GENERALISED_IMPULSE, V_IMPULSIVE, V_AFTER, STEP_DISPLACEMENT = range(8)
-# columns of MechanismTables.spring_x: stiffness, damping, implicit share b, addition to the mass matrix, scratch,
-# number of the force, its number of directions, the direction, length along it; bias acceleration
-(
-    SPRING_K,
-    SPRING_C,
-    SPRING_SHARE,
-    SPRING_ADDED_MASS,
-    SPRING_SOLUTION,
-    SPRING_FORCE,
-    SPRING_DIRECTIONS,
-    SPRING_DIRECTION,
-    SPRING_LENGTH,
-    SPRING_BIAS,
-) = range(10)
-# columns of MechanismTables.job: start of its J and Y, number of rows, next job of the group
-JOB_AT, JOB_ROWS, JOB_NEXT = range(3)
-# columns of MechanismTables.line, the single rows: kind (joint friction, stop, rope), measured quantity, force that it
-# replaces
-LINE_KIND, LINE_QUANTITY, LINE_FORCE = range(3)
-LINE_FRICTION, LINE_STOP, LINE_ROPE = range(3)
-# columns of MechanismTables.line_x: bounds and restitution of a stop; stiffness, damping and free length of a rope;
-# arm (in the first column) and joint load of friction; the force of the step
-LINE_LOWER, LINE_UPPER, LINE_RESTITUTION, ROPE_K, ROPE_C, ROPE_LENGTH, FRICTION_LOAD, LINE_REACTION = range(8)
-# columns of MechanismTables.active: number of the single row + 1, negative for an upper stop; group; start of its row
-LINE_OF, LINE_GROUP, LINE_AT = range(3)
+LINE_FRICTION, LINE_STOP, LINE_ROPE = range(3)  # SingleRows.kind
 # status: tables too small (task ROWS); the engine failed; velocities did not converge; step too long for compliant
 # contacts
 TABLES_FULL, NO_SOLUTION, NOT_CONVERGED, STEP_TOO_LONG = 100, 101, 102, 103
@@ -204,6 +233,80 @@ class MechanismCounts(Record, kind="Int"):
     accept_unsettled: int  # whether the step is accepted with velocities that did not converge
 
 
+class MechanismVelocities(NamedTuple):
+    """Velocities of the mechanism [(nv,)]."""
+
+    before: Float1  # at the start of the step
+    change: Float1  # present iterate of their change without contact impulses
+    smooth: Float1  # that change from the evaluation at half of it
+    effort: Float1  # of drivers there
+    impulse: Float1  # generalised impulses of contacts and single rows
+    impulsive: Float1  # change by them
+    after: Float1  # at the end
+    displacement: Float1  # also scratch
+
+
+class MechanismReactions(NamedTuple):
+    """Multipliers of the constraint rows [(nr,)]."""
+
+    smooth: Float1  # without contact
+    impulse: Float1  # reaction impulses to contacts and single rows in the step
+    impact: Float1  # to impacts before it
+
+
+class Springs(Record, kind="Float", rows=True):
+    """Springs treated implicitly."""
+
+    stiffness: Column
+    damping: Column
+    implicit_share: Column
+    added_mass: Column  # addition to the mass matrix
+    solution: Column  # scratch
+    force: Column  # its number
+    directions: Column  # their number
+    direction: Column
+    length: Column  # along the direction
+    bias: Column  # acceleration
+
+
+class SingleRows(Record, kind="Int", rows=True):
+    """Single rows: joint friction, stops, ropes."""
+
+    kind: Column
+    quantity: Column  # measured
+    force: Column  # that it replaces
+
+
+class SingleRowLaws(Record, kind="Float", rows=True):
+    """Laws of the single rows."""
+
+    lower: Column  # bounds of a stop
+    upper: Column
+    restitution: Column
+    stiffness: Column  # of a rope
+    damping: Column
+    length: Column  # free length
+    arm: Column  # of friction
+    load: Column  # joint load of friction
+    reaction: Column  # force of the step
+
+
+class ActiveRows(Record, kind="Int", rows=True):
+    """Single rows that act in the step."""
+
+    line: Column  # number of the single row + 1, negative for an upper stop
+    group: Column
+    first: Column  # start of its row
+
+
+class Jobs(Record, kind="Int", rows=True):
+    """Rows whose responses are computed together."""
+
+    first: Column  # start of its J and Y
+    rows: Column  # their number
+    next: Column  # job of the group
+
+
 class MechanismTables(NamedTuple):
     """The jointed mechanism: tables, the engine's workspaces, and those of the step."""
 
@@ -218,19 +321,18 @@ class MechanismTables(NamedTuple):
     count: MechanismCounts  # type: ignore[assignment]
     mover: Int2  # (movers, 2): row of the body table, group
     group: Int1  # (ng + 1,)
-    wide: Float2  # (8, nv)
-    lam: Float2  # (3, nr): multipliers without contact; reaction impulses to contacts and single rows in the step;
-    # those to impacts before it
-    spring_x: Float2  # (springs, 10)
+    velocities: MechanismVelocities
+    reactions: MechanismReactions
+    springs: Springs
     spring_J: Float2  # (springs, nv)
     spring_Y: Float2  # (springs, nv)
     stiff: Float2  # (springs, springs): Cholesky factor
     mixing: Float2  # (MIXING_ROWS, nv)
     weight: Float2  # (MIXED_GUESSES + 1, MIXED_GUESSES + 1)
-    line: Int2  # (lines, 3)
-    line_x: Float2  # (lines, 8)
-    active: Int2  # (2 lines, 3)
-    job: Int2  # (2 contacts + lines, 3)
+    line: SingleRows
+    line_law: SingleRowLaws
+    active: ActiveRows  # (2 lines)
+    job: Jobs  # (2 contacts + lines)
     queue: Int1  # (ng,): the next job of each group
     pose: Float2  # (movers, 12): before the projection onto the joints
 
@@ -242,7 +344,11 @@ def _empty_tables(layout: Struct) -> Any:
         if isinstance(x, Struct):
             parts.append(_empty_tables(x))
         else:
-            parts.append(x.of.blank() if isinstance(x, RecordLayout) else np.zeros((0,) * x.ndim, x.dtype))
+            parts.append(
+                x.of.blank(*[0] * (x.array.ndim - 1))
+                if isinstance(x, RecordLayout)
+                else np.zeros((0,) * x.ndim, x.dtype)
+            )
     return layout.of(*parts)
 
 

@@ -18,7 +18,6 @@ from ....math.scalar import sqrt
 from ....math.vec import add, col, dot, load3, mtv, mv, scale, sub
 from ...shape_kinds import BOX
 from ...shapes.registry import radius, support
-from ...tables import KIND, PAR
 from ..distance import generic_pair
 from ..manifold import manifold
 
@@ -31,7 +30,7 @@ def is_shortest(G, i, j, B, found, inside, r):
     far, n, q, h = found
     if far + r > 0.0:
         return True
-    x = sub(add(B[0], mv(B[1], support(G.shape_i[j, KIND], G, j, mtv(B[1], n)))), q)
+    x = sub(add(B[0], mv(B[1], support(G.shape.kind[j], G, j, mtv(B[1], n)))), q)
     up = dot(n, x)
     D = up + 2.0 * (h + r) + far
     aside = sqrt(max(0.0, dot(x, x) - up * up))
@@ -41,8 +40,8 @@ def is_shortest(G, i, j, B, found, inside, r):
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write up to four contacts."""
-    kind = G.shape_i[j, KIND]
-    h, r = load3(G.shape_x, i, PAR), radius(kind, G, j)
+    kind = G.shape.kind[j]
+    h, r = load3(G.dimensions.par, i, 0), radius(kind, G, j)
     far, n, q = -inf, (0.0, 0.0, 0.0), B[0]
     k = 0
     for c in range(3):

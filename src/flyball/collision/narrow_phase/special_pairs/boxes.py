@@ -14,7 +14,6 @@ from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ....math.vec import cross, dot, load3, mm, mtv, mv, neg, scale, transpose
 from ...shape_kinds import BOX
-from ...tables import PAR
 from ..distance import signed_distance
 from ..manifold import manifold, smallest_contact_gap
 
@@ -74,7 +73,7 @@ def axis_vector(axis, C, c):
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write up to four contacts."""
-    a, b = load3(G.shape_x, i, PAR), load3(G.shape_x, j, PAR)
+    a, b = load3(G.dimensions.par, i, 0), load3(G.dimensions.par, j, 0)
     c = mtv(A[1], B[0])
     C = mm(transpose(A[1]), B[1])
     prefer = PREFER * (min(a[0], min(a[1], a[2])) + min(b[0], min(b[1], b[2])))

@@ -7,7 +7,6 @@ from math import inf
 from ....compiler.formulas import formula
 from ....math.vec import add, col, cross, dot, neg, scale, sub
 from ...shape_kinds import CAPSULE, SPHERE
-from ...tables import KIND, PAR
 from ..primitives import nearest_parameter, nearest_parameters, sphere_contact, unit_vector_between, write_point
 
 PAIRS = ((SPHERE, CAPSULE), (CAPSULE, CAPSULE))
@@ -21,7 +20,7 @@ SAME_GAP = 1e-5  # relative to the radii; smaller differences of gaps count as n
 def axis_segment(G, i, P):
     """Axis segment of a capsule: lower end, vector to the upper end."""
     z = col(P[1], 2)
-    h = 0.0 if G.shape_i[i, KIND] == SPHERE else G.shape_x[i, PAR + 1]
+    h = 0.0 if G.shape.kind[i] == SPHERE else G.dimensions.par[i, 1]
     return sub(P[0], scale(h, z)), scale(2.0 * h, z)
 
 
@@ -79,7 +78,7 @@ def collide(G, i, j, A, B, reach, scratch):
     """Write the contact at the nearest points, and for nearly parallel segments those at the ends of the overlap."""
     a, u = axis_segment(G, i, A)
     b, v = axis_segment(G, j, B)
-    first, second = (a, u, G.shape_x[i, PAR]), (b, v, G.shape_x[j, PAR])
+    first, second = (a, u, G.dimensions.par[i, 0]), (b, v, G.dimensions.par[j, 0])
     p, q = nearest_parameters(a, u, b, v)
     gap, n = nearest_contact(first, second, p, q, reach, scratch, 0)
     if not gap <= reach:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.vec import mtv, mv, neg, scale
 from ...shape_kinds import POLYGON, SPHERE
-from ...tables import PAR
 from ..distance import point_polygon_distance
 from ..primitives import write_point
 
@@ -15,9 +14,9 @@ KINDS = (SPHERE, POLYGON)
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write one contact; if the centre is inside the polygon, with the normal of the nearest side."""
-    r = G.shape_x[i, PAR]
+    r = G.dimensions.par[i, 0]
     length, d, _ = point_polygon_distance(G, j, neg(mtv(B[1], B[0])))
-    gap = length - r - G.shape_x[j, PAR]
+    gap = length - r - G.dimensions.par[j, 0]
     if not gap <= reach:
         return 0
     n = mv(B[1], (-d[0], -d[1], 0.0))

@@ -31,7 +31,6 @@ from ...shapes.height_field import (
     reduce_contacts,
 )
 from ...shapes.registry import SHAPES, face, radius, support
-from ...tables import KIND
 from ..distance import core_separation
 from ..manifold import NEAREST_FEATURE, manifold
 from ..primitives import FACE_2, FIELD_TRIANGLE, MAX_CORNERS, SIMPLEX
@@ -48,7 +47,7 @@ SPARE_ROW = FIRST_GATHERED - 1
 def extent(G, s, p, R, r, axis):
     """Range that a shape covers along an axis of the field."""
     d = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
-    kind, local = G.shape_i[s, KIND], mtv(R, d)
+    kind, local = G.shape.kind[s], mtv(R, d)
     low = add(p, mv(R, support(kind, G, s, neg(local))))
     high = add(p, mv(R, support(kind, G, s, local)))
     return low[axis] - r, high[axis] + r
@@ -70,7 +69,7 @@ def add_surface_point(G, f, point, n, limits, scratch, count):
 def corner_contacts(G, f, s, P, n, r, limits, scratch, count):
     """Add contacts of the corners of the side that faces the triangle with unit normal n, and of the lowest point."""
     p, R = P
-    kind = G.shape_i[s, KIND]
+    kind = G.shape.kind[s]
     down = mtv(R, neg(n))
     a = load3(scratch, FIELD_TRIANGLE, 0)
     lowest = sub(add(p, mv(R, support(kind, G, s, down))), scale(r, n))
@@ -152,13 +151,13 @@ def gather_contacts(G, f, s, P, r, reach, scratch, near):
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Find contacts in the field's axes, reduce them, and convert them to world axes."""
-    turned = G.shape_i[j, KIND] == FIELD
+    turned = G.shape.kind[j] == FIELD
     f, s = (j, i) if turned else (i, j)
     p, Q = B if turned else A
     q, S = A if turned else B
     P = (mtv(Q, sub(q, p)), mm(transpose(Q), S))
     nx, ny, dx, dy = grid(G, f)
-    r = radius(G.shape_i[s, KIND], G, s)
+    r = radius(G.shape.kind[s], G, s)
     near = SAME_CONTACT * min(dx, dy)
     count = reduce_contacts(scratch, FIRST_GATHERED, gather_contacts(G, f, s, P, r, reach, scratch, near), near)
     for k in range(count):

@@ -8,7 +8,6 @@ from ....compiler.formulas import formula
 from ....math.vec import add, col, dot, mtv, mv, neg, store3
 from ...shape_kinds import PLANE
 from ...shapes.registry import radius, support
-from ...tables import KIND, RADIUS
 from ..manifold import (
     DEPTH,
     EDGE,
@@ -32,7 +31,7 @@ def collide(G, i, j, A, B, reach, scratch):
     """Write contacts of the corners of the face towards the plane, and of the lowest point if it is lower."""
     n = col(A[1], 2)
     frame = contact_frame(n)
-    kind = G.shape_i[j, KIND]
+    kind = G.shape.kind[j]
     r = radius(kind, G, j)
     d = mtv(B[1], neg(n))
     lowest = add(B[0], mv(B[1], support(kind, G, j, d)))
@@ -49,7 +48,7 @@ def collide(G, i, j, A, B, reach, scratch):
             scratch[to, EDGE], scratch[to, DEPTH] = number * MAX_CORNERS + k - FACE_1, g
             kept += 1
             least = min(least, g)
-    same = SAME_POINT * G.shape_x[j, RADIUS]
+    same = SAME_POINT * G.dimensions.radius[j]
     if gap < least - same:
         store3(scratch, FACE_1 + kept, 0, (dot(frame[0], lowest), dot(frame[1], lowest), 0.5 * gap))
         scratch[FACE_1 + kept, EDGE], scratch[FACE_1 + kept, DEPTH] = NEAREST_FEATURE, gap

@@ -8,7 +8,6 @@ from ....compiler.formulas import formula
 from ....math.vec import add, mtv, mv, neg, scale, sub
 from ...shape_kinds import POLYGON
 from ...shapes.polygon import support
-from ...tables import PAR, RADIUS
 from ..distance import polygon_distance, polygon_separation
 from ..manifold import manifold, smallest_contact_gap
 
@@ -19,8 +18,8 @@ PREFER = 1e-9  # relative to the size; preference of sides over corners, of the 
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write one or two contacts of the facing sides."""
-    r, s = G.shape_x[i, PAR], G.shape_x[j, PAR]
-    prefer = PREFER * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
+    r, s = G.dimensions.par[i, 0], G.dimensions.par[j, 0]
+    prefer = PREFER * min(G.dimensions.radius[i], G.dimensions.radius[j])
     far, n = polygon_separation(G, i, j, A, B, prefer)
     if far - r - s > reach:
         return 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.vec import load3, mtv, mv, neg, scale
 from ...shape_kinds import BOX, SPHERE
-from ...tables import PAR
 from ..primitives import unit_vector_between, write_point
 
 KINDS = (SPHERE, BOX)
@@ -14,7 +13,7 @@ KINDS = (SPHERE, BOX)
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write one contact; if the centre is inside the box, with the normal of the nearest side."""
-    h, r = load3(G.shape_x, j, PAR), G.shape_x[i, PAR]
+    h, r = load3(G.dimensions.par, j, 0), G.dimensions.par[i, 0]
     c = neg(mtv(B[1], B[0]))  # the sphere's centre in the box's axes
     q = (max(-h[0], min(h[0], c[0])), max(-h[1], min(h[1], c[1])), max(-h[2], min(h[2], c[2])))
     d, length = unit_vector_between(c, q)

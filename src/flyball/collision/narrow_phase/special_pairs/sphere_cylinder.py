@@ -5,7 +5,6 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.vec import mtv, mv, neg, scale
 from ...shape_kinds import CYLINDER, SPHERE
-from ...tables import PAR
 from ..primitives import lateral_direction, unit_vector_between, write_point
 
 KINDS = (SPHERE, CYLINDER)
@@ -14,7 +13,7 @@ KINDS = (SPHERE, CYLINDER)
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write one contact; if the centre is inside the cylinder, with the normal of the nearest part of its surface."""
-    r, s, h = G.shape_x[i, PAR], G.shape_x[j, PAR], G.shape_x[j, PAR + 1]
+    r, s, h = G.dimensions.par[i, 0], G.dimensions.par[j, 0], G.dimensions.par[j, 1]
     c = neg(mtv(B[1], B[0]))  # the sphere's centre in the cylinder's axes
     (x, y), rho = lateral_direction(c)
     q = min(rho, s)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.vec import col, dot, neg, scale
 from ...shape_kinds import PLANE, SPHERE
-from ...tables import PAR
 from ..primitives import write_point
 
 KINDS = (SPHERE, PLANE)
@@ -14,7 +13,7 @@ KINDS = (SPHERE, PLANE)
 @formula
 def collide(G, i, j, A, B, reach, scratch):
     """Write one contact, below the sphere's centre."""
-    n, r = neg(col(B[1], 2)), G.shape_x[i, PAR]
+    n, r = neg(col(B[1], 2)), G.dimensions.par[i, 0]
     gap = dot(n, B[0]) - r
     if not gap <= reach:
         return 0
