@@ -176,7 +176,7 @@ def errors_of(s: Structure, name: str, size: float) -> list[str]:
         """As complex numbers, whose sense is not examined: a damping of zero is changed both ways."""
         return {k: x.real for k, x in tables(values(s, {name: complex(value + change)})).items()}
 
-    base = s.kept.get("tables as they stand", None, 1, lambda: changed(0.0))  # the same by whichever parameter
+    base = s.cache.get("tables as they stand", None, 1, lambda: changed(0.0))  # the same by whichever parameter
     return list(compared(changed, base, complex_tables(s, name), size))
 
 
