@@ -438,7 +438,9 @@ def _happened(b: Base, run: Any, h: int) -> str:
     for one, two, which in ((*lists, "only at first"), (*lists[::-1], "only then")):
         for name, kind, t in one:
             alike = any((name, kind) == (n, k) and abs(t - s) <= near for n, k, s in two)
-            left = [[k not in RELEASES for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)]
+            left = [
+                [k not in RELEASES for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)
+            ]
             alike = alike or (all(left) and left[0][-1] == left[1][-1] and kind in SWITCHED)
             alike = alike or (kind in HOLDS and t <= near)
             alike = alike or any(
