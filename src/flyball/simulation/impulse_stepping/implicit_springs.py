@@ -192,7 +192,9 @@ def spring_impulse(A, h, i, before, change):
 
 LENGTH_ITERATIONS = 3
 STIFF_SHARE = 1e-3  # implicit share b above which the length of a spring is corrected
-LENGTH_TOLERANCE = 1e-12  # negligible change of a spring's length, relative to itself or a radian
+LENGTH_TOLERANCE = (
+    1e-12  # negligible change of a spring's length, relative to itself and to the mechanism's length or a radian
+)
 
 
 @formula
@@ -214,6 +216,15 @@ def spring_length(A, i):
     """`force_length` of spring i of the step."""
     x = A.spring_x[i]
     return force_length(A.S, A.W, int(x[SPRING_FORCE]), int(x[SPRING_DIRECTIONS]), int(x[SPRING_DIRECTION]))
+
+
+@formula
+def length_unit(A, i):
+    """Return the mechanism's length, or a radian if `spring_length` of spring i is an angle."""
+    k = int(A.spring_x[i, SPRING_FORCE])
+    if A.S.forces.family[k] == 1:
+        return A.S.units[A.S.forces.F[k]]
+    return A.S.scales.length if A.spring_x[i, SPRING_DIRECTION] < 3.0 else 1.0
 
 
 @formula
@@ -267,7 +278,7 @@ def correct_spring_lengths(A):
                 x[SPRING_LENGTH] + dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT]) + 0.125 * h * h * x[SPRING_BIAS]
             )
             x[SPRING_SOLUTION] = spring_length(A, i) - told
-            worst = max(worst, abs(x[SPRING_SOLUTION]) / (1.0 + abs(told)))
+            worst = max(worst, abs(x[SPRING_SOLUTION]) / (length_unit(A, i) + abs(told)))
         if not LENGTH_TOLERANCE < worst < 1.0:
             return
         solve_springs(A)

@@ -63,6 +63,12 @@ def line_group(A, k):
 
 
 @formula
+def line_lever(A, k):
+    """Return the lever [m] that turns the rate of single row k into a velocity [m/s]; 1 if it is one already."""
+    return A.S.scales.length / A.S.units[A.line[k, LINE_QUANTITY]]
+
+
+@formula
 def line_rate(A, k, v):
     """Return the rate of the quantity of single row k at velocities v."""
     s = 0.0
@@ -81,15 +87,16 @@ def stop_gap(A, k, side):
 
 @formula
 def line_acts(A, k, side):
-    """Return whether single row k acts in this step; of two stops the nearer one always does, since impacts may reach
-    it.
+    """Return whether single row k acts in this step.
+
+    Of two stops the nearer one always does, since impacts may reach it. The other one does if the motion, or the
+    correction of an overrun, may reach it.
     """
     if A.line[k, LINE_KIND] != LINE_STOP:
         return side > 0
+    gap, other = stop_gap(A, k, side), stop_gap(A, k, -side)
     r, dr = line_rate(A, k, A.wide[V_BEFORE]), line_rate(A, k, A.wide[V_CHANGE])
-    if stop_gap(A, k, side) < stop_gap(A, k, -side):
-        return True
-    return stop_gap(A, k, side) < STOP_LOOKAHEAD * A.real.step * (abs(r) + abs(dr)) + 1e-9
+    return gap <= other or gap < STOP_LOOKAHEAD * (A.real.step * (abs(r) + abs(dr)) + max(0.0, -other))
 
 
 @formula
@@ -116,13 +123,14 @@ def line_rows(A, P, used, jobs, write):
 
 @formula
 def line_row(A, P, k, g, where):
-    """Write the gradient of the quantity of single row k, reversed for an upper stop."""
+    """Write the gradient of the quantity of single row k times its lever, reversed for an upper stop."""
     at, size, side = where
+    lever = side * line_lever(A, k)
     for d in range(size):
         P.J[at + d] = 0.0
     r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
-        P.J[at + A.S.column[e] - A.group[g]] += side * A.W.G[e]
+        P.J[at + A.S.column[e] - A.group[g]] += lever * A.W.G[e]
 
 
 @formula
@@ -136,9 +144,9 @@ def line_laws(A, P, n):
         x = P.line_x[i]
         P.line_at[i, 0], P.line_at[i, 1] = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
         x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.0, 0.0, 0.0, INFINITE
-        rate = side * line_rate(A, k, A.wide[V_BEFORE])
         if A.line[k, LINE_KIND] == LINE_STOP:
-            gap = stop_gap(A, k, side)
+            lever = line_lever(A, k)
+            rate, gap = lever * side * line_rate(A, k, A.wide[V_BEFORE]), lever * stop_gap(A, k, side)
             hit = rate < 0.0 and gap + h * rate <= 0.0
             x[LINE_BIAS] = A.line_x[k, LINE_RESTITUTION] * rate if hit else max(gap, 0.0) / h
         elif A.line[k, LINE_KIND] == LINE_ROPE:
@@ -150,7 +158,7 @@ def line_laws(A, P, n):
 @formula
 def friction_law(A, P, i, k, x):
     """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
-    h = A.real.step
+    h, lever = A.real.step, line_lever(A, k)
     g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
     w = 0.0
     for d in range(A.group[g + 1] - A.group[g]):
@@ -158,9 +166,9 @@ def friction_law(A, P, i, k, x):
     t, arm, load = A.real.time + 0.5 * h, A.line_x[k, LINE_LOWER], A.line_x[k, FRICTION_LOAD]
     rate = line_rate(A, k, A.wide[V_BEFORE])
     held = h * static_friction_limit(A.S, A.W, A.line[k, LINE_FORCE], t, arm, load)
-    if abs(rate) > REST_SHARE * held * w:
+    if lever * abs(rate) > REST_SHARE * held / lever * w:
         held = h * dry_friction(A.S, A.W, A.line[k, LINE_FORCE], t, rate, arm, load)
-    x[LINE_LOW], x[LINE_HIGH] = -held, held
+    x[LINE_LOW], x[LINE_HIGH] = -held / lever, held / lever
 
 
 @formula
@@ -190,7 +198,8 @@ def account_lines(A, P, X):
     for i in range(P.size[3]):
         k = abs(A.active[i, LINE_OF]) - 1
         side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
-        work = X.line[i] * side * 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
+        impulse = X.line[i] * side * line_lever(A, k)
+        work = impulse * 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
         if A.line[k, LINE_KIND] == LINE_STOP:
             A.real.lost -= work
         else:
@@ -198,7 +207,7 @@ def account_lines(A, P, X):
             if A.S.forces.work[f] >= 0:
                 z = A.S.sizes.coordinates + A.wide.shape[1] + A.S.forces.work[f]
                 A.clock.K[0, z] += work / A.real.step
-            A.line_x[k, LINE_REACTION] = X.line[i] * side / A.real.step
+            A.line_x[k, LINE_REACTION] = impulse / A.real.step
     update_friction_loads(A)
 
 
@@ -227,7 +236,7 @@ def keep_stops_only(A, P, X):
         x[LINE_SOFT] = x[LINE_LOW] = x[LINE_HIGH] = 0.0
         if A.line[k, LINE_KIND] == LINE_STOP:
             mean = 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
-            gap = stop_gap(A, k, side) + A.real.step * side * mean
+            gap = line_lever(A, k) * (stop_gap(A, k, side) + A.real.step * side * mean)
             A.real.overrun = min(A.real.overrun, gap)
             x[LINE_BIAS], x[LINE_HIGH] = gap / A.real.step, INFINITE
 

@@ -421,7 +421,7 @@ def _sensor_bodies(sensor) -> list[str]:
 
 CONTACT_MARGIN = 0.01  # gap up to which non-approaching shapes are in contact, relative to the smallest shape
 NO_OVERLAP = 1e-9  # negligible overlap, relative to the smallest shape
-SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
+SLOW_CONTACT = 0.1  # speed below which nothing bounces, whatever gravity is, relative to the tolerance of velocities
 DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
 """Default largest number of iterations by solver; `OTHER_ITERATIONS` for the others."""
 COARSE_FACTOR = 100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
@@ -458,7 +458,7 @@ def make_stepper(
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
     real[GRAVITY : GRAVITY + 3] = values.system.gravity
     size = smallest_radius(scene, values)
-    real[NO_BOUNCE_BELOW], real[NO_OVERLAP_BELOW] = SLOW_CONTACT, NO_OVERLAP * size
+    real[NO_BOUNCE_BELOW], real[NO_OVERLAP_BELOW] = SLOW_CONTACT * o.tolerance, NO_OVERLAP * size
     real[VELOCITY_TOLERANCE], real[POSITION_TOLERANCE] = o.tolerance, o.tolerance
     real[REPORTED_RESIDUAL] = max(
         float(np.sqrt((real[GRAVITY : GRAVITY + 3] ** 2).sum())), COARSE_FACTOR * o.tolerance / o.longest
