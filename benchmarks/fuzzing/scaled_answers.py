@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -31,6 +32,15 @@ def curves(run: fb.Result | fb.InverseDynamics, s: Scale) -> Answers:
     return out
 
 
+def numbers(run: fb.Result | fb.InverseDynamics, s: Scale) -> Answers:
+    """All numbers of a result by unit: what is zero but for rounding is compared with the others."""
+    found, out = curves(run, s), {}
+    for name, (unit, _) in run.channels().items():
+        if name in found:
+            out.setdefault(unit, []).append(found[name])
+    return {unit: np.stack(x, axis=-1) for unit, x in out.items()}
+
+
 def assembly(m: fb.Mechanism, s: Scale) -> Answers:
     """Position and velocity, relative to the mechanism's length."""
     a = m.assemble()
@@ -53,18 +63,17 @@ def mobility(m: fb.Mechanism, s: Scale) -> Answers:
 
 
 def equilibrium(m: fb.Mechanism, s: Scale) -> Answers:
-    """State at rest, its stability and direction of least stiffness."""
+    """State at rest and its stability."""
     x = m.equilibrium()
-    out = curves(x.result, s) | {"stability": x.stability, "freedoms": x.freedoms, "least": np.array(x.least)}
-    return out | {f"weakest {k}": np.array(v) for k, v in x.weakest.items()}
+    return numbers(x.result, s) | {"stability": x.stability, "touching": [t.state for t in x.touching]}
 
 
 def linear(m: fb.Mechanism, s: Scale) -> Answers:
     """Matrix of the linear equations, and the state about which they are."""
     x = m.linearize(frozen=True)
-    size = np.array([s.of(unit) for unit in x.units])
+    size = np.array([s.of(unit) for unit in x.state_units])
     rate = 1.0 if x.period is not None else s.time
-    return curves(x.point, s) | {"A": x.A * rate / size[:, None] * size, "turning": x.turning * s.time}
+    return numbers(x.point, s) | {"A": x.A * rate / size[:, None] * size, "turning": x.turning * s.time}
 
 
 def modes(m: fb.Mechanism, s: Scale) -> Answers:
@@ -86,7 +95,7 @@ def _freedoms(m: fb.Mechanism, s: Scale) -> dict[str, float]:
 
 def kinematics(m: fb.Mechanism, s: Scale) -> Answers:
     """Motion of the mechanism where its drivers leave no freedom."""
-    return curves(m.kinematics(TIMES * s.time, progress=False, specialize=False), s)
+    return numbers(m.kinematics(TIMES * s.time, progress=False, specialize=False), s)
 
 
 def inverse_dynamics(m: fb.Mechanism, s: Scale) -> Answers:
@@ -95,7 +104,7 @@ def inverse_dynamics(m: fb.Mechanism, s: Scale) -> Answers:
         name: f"{value!r} + {SWING * s.coordinate(name)!r}*(1 - cos(t/{s.time!r}))"
         for name, value in _freedoms(m, s).items()
     }
-    return curves(m.inverse_dynamics(TIMES * s.time, laws, progress=False, specialize=False), s)
+    return numbers(m.inverse_dynamics(TIMES * s.time, laws, progress=False, specialize=False), s)
 
 
 def singularities(m: fb.Mechanism, s: Scale) -> Answers:
@@ -104,6 +113,8 @@ def singularities(m: fb.Mechanism, s: Scale) -> Answers:
     for name, value in _freedoms(m, s).items() if not drivers else ():
         drivers.append(("sweep", name))
         m.add(fb.Driver("sweep", name, law=value))
+    if not drivers:
+        return {"error": "no freedom is a coordinate"}
     name, coordinate = drivers[0]
     middle = float(m.linearize(frozen=True).point.channels()[coordinate][1][0])
     unit = s.coordinate(coordinate)
@@ -115,18 +126,21 @@ def singularities(m: fb.Mechanism, s: Scale) -> Answers:
     return out
 
 
+def _with_factor(m: fb.Mechanism) -> fb.Mechanism:
+    """The mechanism with a parameter that multiplies gravity and the mass of the first body."""
+    gravity = tuple(f"({g!r})*{FACTOR}" if g else g for g in m.gravity)
+    out = fb.Mechanism(m.name, planar=m.planar, gravity=gravity, parameters={FACTOR: 1.0})
+    body = m.bodies[0]
+    out.add(*(dataclasses.replace(e, mass=f"({e.mass!r})*{FACTOR}") if e is body else e for e in m.elements()))
+    return out
+
+
 def _sensitivity(analysis: str) -> Callable[[fb.Mechanism, Scale], Answers]:
     def of(m: fb.Mechanism, s: Scale) -> Answers:
         """Derivatives with respect to a factor of gravity and of a mass."""
-        m = m.copy()
-        m.parameters[FACTOR] = 1.0
-        if any(m.gravity):
-            m.gravity = tuple(f"({g!r})*{FACTOR}" for g in m.gravity)
-        body = m.bodies[0]
-        body.mass = f"({body.mass!r})*{FACTOR}"
-        names = list(m.assemble().compiled.structure.model.joints)
-        what = [] if analysis == "modes" else [f"{body.name}.{k}" for k in ("x", "vx", "ax")]
-        what += [f"{j.name}.fx" for j in names[:2]] if analysis != "modes" else []
+        m, body = _with_factor(m), m.bodies[0].name
+        what = [f"{body}.{k}" for k in ("x", "vx", "ax")] + [f"{j.name}.fx" for j in m.joints[:2]]
+        what = [] if analysis == "modes" else what[:1] if analysis == "equilibrium" else what
         x = m.sensitivity(what, analysis=analysis)
         size = np.array([s.of(unit) for unit in x.units])
         return {"values": x.values / size, "derivatives": x.derivatives[..., 0] / size}

@@ -37,6 +37,22 @@ def test_a_motion_in_other_units_is_the_same_to_the_last_bit(name):
         assert not scales.differences(own, scales.answers(scales.scaled(m, s), t_end * s.time, options, s))
 
 
+QUICK = ("assemble", "mobility", "kinematics", "linearize", "modes", "singularities", "sensitivity instant")
+
+
+@pytest.mark.parametrize("name", [*EXAMPLES, *RANDOM])
+def test_other_analyses_in_other_units_answer_the_same(name):
+    m = CASES[name]()[0]
+    for analysis in (x for x in QUICK if (name, x) not in scales.UNDECIDED):
+        allowed = scales.ROUNDING if analysis in scales.ROUNDED else 0.0
+        own, *others = (
+            scales.scaled_answers.asked(analysis, scales.scaled(m, s), s)
+            for s in (scales.Scale(), SMALL_SLOW, LARGE_FAST)
+        )
+        for other in others:
+            assert not scales.differences(own, other, allowed)
+
+
 @pytest.mark.parametrize("name", [name for name in STEPPED if name not in EXACT])
 def test_compliant_contacts_do_not_depend_on_the_units_of_mass_and_time(name):
     units = [u for u in scales.SCALES if not scales.is_exempt(name, u)]
