@@ -1,11 +1,12 @@
 """Mechanisms in other units of length, mass and time, by powers of two: every number of the result is the scaled one.
 
-Usage: ``python benchmarks/scales.py [--seeds N] [--only TEXT ...] [--all-differences]``. Without options all examples
-and 200 random mechanisms in all six scales. What may differ, and why, is listed in `EXEMPT`.
+Usage: ``python benchmarks/scales.py [--seeds N] [--only TEXT ...] [--analyses NAME ...] [--all-differences]``. Without
+options motions of all examples and 200 random mechanisms in all six scales; ``--analyses all`` asks for all others, too
+(`scaled_answers.ANALYSES`). What may differ, and why, is listed in `EXEMPT`.
 
-Where libraries may round otherwise in other units: ``pow`` of the C library, and LAPACK where a matrix mixes units (of
-motions, none does). Code made for one mechanism is not compared: whether it is used depends on the time that its
-compilation takes.
+Where libraries round otherwise in other units, `ROUNDED` says so, and numbers agree to `ROUNDING`: ``pow`` of the C
+library, and LAPACK where it compares numbers with powers of ten or balances a matrix. Code made for one mechanism is
+not compared: whether it is used depends on the time that its compilation takes.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import runpy
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +27,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
-from fuzzing import content, scenes, verdicts
+from fuzzing import content, scaled_answers, scenes, verdicts
 from fuzzing.scaling import Scale, Unsupported, scaled
 
 import flyball as fb
 from flyball.simulation.integration_options import BAUMGARTE_RATE
 
-UNDERFLOW = 1e-290  # smaller numbers are equal: near the smallest ones that there are, digits are lost
+ROUNDING = 1e-9  # difference by rounding of libraries, relative to the largest value of a curve
 ROOT = Path(__file__).resolve().parents[1]
 SCALES = {
     "mass up": Scale(mass=2.0**20), "mass down": Scale(mass=2.0**-20),
@@ -43,6 +44,20 @@ SPAN = 0.2  # of an example [s]
 OUTPUTS = 11
 MAX_STEPS = 3000
 FAMILIES = (*content.FAMILIES, *scenes.SCENES)
+MOTION = "simulate"
+ROUNDED = {
+    "assemble": "LAPACK: singular values of velocity equations in units of energy",
+    "mobility": "LAPACK: singular values, and inverses of matrices that mix units",
+    **dict.fromkeys(
+        ("linearize", "modes", "kinematics", "inverse_dynamics"), "LAPACK: inverses of matrices that mix units"
+    ),
+    "equilibrium": "LAPACK: least squares of forces and gaps; it ends where a small step would not change it",
+    **dict.fromkeys(
+        ("sensitivity instant", "sensitivity equilibrium", "sensitivity modes"),
+        "LAPACK: inverses of matrices that mix units",
+    ),
+}  # fmt: skip
+"""Analyses in which a library rounds otherwise in other units, and where: they agree to `ROUNDING`."""
 Made = tuple[fb.Mechanism, float, dict[str, Any]]
 
 
@@ -66,7 +81,19 @@ def _example(path: Path) -> Made:
 def _random(family: str, seed: int) -> Made:
     case = verdicts.made(family, seed)
     dropped = ("outputs", "max_steps")
-    return case.mechanism, case.t_end, {k: v for k, v in case.options.items() if k not in dropped}
+    options = {k: v for k, v in case.options.items() if k not in dropped}
+    if family in scenes.SCENES and "method" not in options:
+        options |= _stepping(case.mechanism, case.t_end)
+    return case.mechanism, case.t_end, options
+
+
+def _stepping(m: fb.Mechanism, t_end: float) -> dict[str, Any]:
+    """Step and tolerance of impulse time stepping where it is chosen: the default ones are in units."""
+    try:
+        method = m.simulate(t_end, progress=False).health.options.get("method")
+    except fb.FlyballError:
+        return {}
+    return {"method": fb.Stepping(step=fb.Stepping.usual)} if isinstance(method, Mapping) else {}
 
 
 NOT_CONVERTED = {
@@ -78,21 +105,19 @@ NOT_CONVERTED = {
 """Examples that `fuzzing.scaling` cannot write in other units."""
 EXEMPT = {
     "shaken": "elastic ropes: places within a step at which both the force and the gap of a rope are guards",
-    **dict.fromkeys(
-        (
-            *scenes.SCENES, "conveyor.toml", "gripper.py", "labyrinth.py", "newtons_cradle.py", "rocking_block.toml",
-            "tippe_top.py",
-        ),
-        "steps by impulses: 1e-6 m/s below which nothing bounces, 1e-9 m of lookahead at stops, pow() of overlaps",
-    ),
-}  # fmt: skip
-"""What may differ beyond mass (ropes: by mass and time), by example or family, and why."""
+    "soft": "pow() of overlaps rounds otherwise in other units of length",
+}
+"""Motions that may differ, by family, and why."""
+UNDECIDED = {("sticking 0", "kinematics"): "friction at rates that are rounding has their sign"}
+"""Other analyses that may differ, and why."""
 
 
-def is_exempt(name: str, scale: str) -> bool:
-    """Whether a case may differ in that scale."""
-    known = name if name in EXEMPT else name.partition(" ")[0]
-    return known in EXEMPT and (known == "shaken" or not scale.startswith("mass"))
+def is_exempt(name: str, scale: str, analysis: str = MOTION) -> bool:
+    """Whether an answer may differ in that scale."""
+    known = name.partition(" ")[0]
+    if analysis != MOTION:
+        return (name, analysis) in UNDECIDED
+    return known in EXEMPT and (known == "shaken" or scale.startswith("length"))
 
 
 def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
@@ -105,10 +130,8 @@ def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
         for name in ("alpha", "beta"):
             out[name] = (out.get(name) or BAUMGARTE_RATE) / s.time
     if isinstance(method := out.get("method"), fb.Stepping):
-        changed = {"step": None if method.step is None else method.step * s.time}
-        if method.tolerance is not None:
-            changed["tolerance"] = method.tolerance * s.length / s.time
-        out["method"] = dataclasses.replace(method, **changed)
+        tolerance = method.tolerance * s.length / s.time
+        out["method"] = dataclasses.replace(method, step=method.longest * s.time, tolerance=tolerance)
     return out
 
 
@@ -121,23 +144,17 @@ def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) ->
         run = m.simulate(t_end, **in_units(chosen, s))
     except fb.FlyballError as error:
         return {"error": type(error).__name__}
-    out: dict[str, Any] = {"t": run.t / s.time}
+    out: dict[str, Any] = {"t": run.t / s.time} | scaled_answers.curves(run, s)
     out["events"] = [f"{e.name} {e.kind}" for e in run.events]
     out["event times"] = np.array([e.t for e in run.events]) / s.time
     out["energy lost"] = np.array([e.lost for e in run.events]) / s.of("J")
     out["counts"] = [run.health.steps, run.health.rejected]
     out["warnings"] = len(run.health.warnings)
-    for name, (unit, values) in run.channels().items():
-        try:
-            curve = np.asarray(values) / s.of(unit)
-            out[name] = np.where(np.abs(curve) < UNDERFLOW, 0.0, curve)
-        except KeyError:
-            continue
     return out
 
 
-def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
-    """What differs, and by how much relative to the largest value."""
+def differences(one: dict[str, Any], other: dict[str, Any], allowed: float = 0.0) -> list[str]:
+    """What differs by more than allowed, and by how much relative to the largest value."""
     out = [f"{k} is in one result only" for k in one.keys() ^ other.keys()]
     for k in one.keys() & other.keys():
         a, b = one[k], other[k]
@@ -149,14 +166,20 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
             size = np.nanmax(np.abs(a), initial=1e-300)
             off = np.nanmax(np.abs(a - b), initial=0.0) / size
             first = int(np.argmax(np.asarray(a != b).reshape(len(a), -1).any(axis=1))) if a.ndim else 0
-            out.append(f"{k}: {off:.2g} from output {first}")
+            if not off <= allowed or not np.array_equal(np.isnan(a), np.isnan(b)):
+                out.append(f"{k}: {off:.2g} from output {first}")
     return out
 
 
-def compared(made: Made, names: list[str]) -> Iterator[tuple[str, list[str] | str]]:
+def compared(made: Made, names: list[str], analysis: str = MOTION) -> Iterator[tuple[str, list[str] | str]]:
     """(scale, differences or why there is no comparison) of each scale."""
     m, t_end, options = made
     own: dict[str, Any] | None = None
+    allowed = ROUNDING if analysis in ROUNDED else 0.0
+
+    def asked(m: fb.Mechanism, s: Scale) -> dict[str, Any]:
+        return answers(m, t_end * s.time, options, s) if analysis == MOTION else scaled_answers.asked(analysis, m, s)
+
     for name in names:
         s = SCALES[name]
         try:
@@ -164,8 +187,8 @@ def compared(made: Made, names: list[str]) -> Iterator[tuple[str, list[str] | st
         except Unsupported as why:
             yield name, str(why)
             continue
-        own = own or answers(scaled(m, Scale()), t_end, options, Scale())
-        yield name, differences(own, answers(other, t_end * s.time, options, s))
+        own = own or asked(scaled(m, Scale()), Scale())
+        yield name, differences(own, asked(other, s), allowed)
 
 
 def main() -> None:
@@ -174,23 +197,27 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="random mechanisms of each family")
     parser.add_argument("--only", nargs="*", default=[], help="cases whose names contain one of these")
     parser.add_argument("--scales", nargs="*", default=list(SCALES))
+    parser.add_argument("--analyses", nargs="*", default=[MOTION], help="names, or all")
     parser.add_argument("--all-differences", action="store_true")
     asked = parser.parse_args()
+    analyses = [MOTION, *scaled_answers.ANALYSES] if asked.analyses == ["all"] else asked.analyses
     total: Counter[str] = Counter()
     warnings.simplefilter("ignore")
     for name, make in cases(asked.seeds):
         if asked.only and not any(x in name for x in asked.only):
             continue
-        for scale, found in compared(make(), asked.scales):
-            if isinstance(found, str):
-                print(f"{name:30} {scale:12} none: {found}", flush=True)
-                total["none"] += 1
-                continue
-            total[f"{scale}: {'differs' if found else 'equal'}"] += 1
-            if found:
-                total["failed"] += not is_exempt(name, scale)
-                what = found if asked.all_differences else sorted(found)[:2]
-                print(f"{name:30} {scale:12} {len(found)}: " + "; ".join(what), flush=True)
+        for analysis in analyses:
+            for scale, found in compared(make(), asked.scales, analysis):
+                label = f"{name:28} {analysis:20} {scale:12}"
+                if isinstance(found, str):
+                    print(f"{label} none: {found}", flush=True)
+                    total["none"] += 1
+                    continue
+                total[f"{analysis}, {scale}: {'differs' if found else 'equal'}"] += 1
+                if found:
+                    total["failed"] += not is_exempt(name, scale, analysis)
+                    what = found if asked.all_differences else sorted(found)[:2]
+                    print(f"{label} {len(found)}: " + "; ".join(what), flush=True)
     for k, n in sorted(total.items()):
         print(f"{k}: {n}")
     sys.exit(total["failed"] > 0)

@@ -43,7 +43,7 @@ def test_a_fixed_step_that_is_too_long_is_told_with_the_longest_stable_one(metho
 def test_the_longest_stable_step_is_that_of_the_stability_region():
     """Hairer and Wanner (1996), section IV.2: 3.31 on the negative real axis for Dormand and Prince's method of order 5."""
     start = find_initial_state(damped().snapshot(), 0.0, None, None, "auto", switches=True).assembly
-    longest, rate = longest_stable(start, tableau("rk45"))
+    longest, rate = longest_stable(start, tableau("rk45"), np.ones(len(start.y)))
     assert rate == pytest.approx(3000.0, rel=1e-5)
     assert longest * rate == pytest.approx(3.31, abs=0.01)
 

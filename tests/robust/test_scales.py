@@ -12,16 +12,19 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 import scales
-from fuzzing import content
+from fuzzing import content, scenes
+
+import flyball as fb
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
 )
 SMALL_SLOW, LARGE_FAST = scales.Scale(2.0**-10, 2.0**20, 2.0**10), scales.Scale(2.0**10, 2.0**-20, 2.0**-10)
-CASES = dict(scales.cases(1))
+CASES = dict(scales.cases(3))
 EXAMPLES = [name for name in CASES if "." in name and name not in scales.NOT_CONVERTED]
 RANDOM = [f"{family} 0" for family in content.FAMILIES]
-EXACT = [name for name in (*EXAMPLES, *RANDOM) if not scales.is_exempt(name, "length up")]
+STEPPED = [f"{family} 2" for family in scenes.SCENES]  # by impulse time stepping
+EXACT = [name for name in (*EXAMPLES, *RANDOM, *STEPPED) if not scales.is_exempt(name, "length up")]
 
 
 @pytest.mark.parametrize("name", EXACT)
@@ -29,13 +32,32 @@ def test_a_motion_in_other_units_is_the_same_to_the_last_bit(name):
     m, t_end, options = CASES[name]()
     own = scales.answers(scales.scaled(m, scales.Scale()), t_end, options, scales.Scale())
     assert name in RANDOM or "error" not in own
+    assert name not in STEPPED or isinstance(options["method"], fb.Stepping)
     for s in (SMALL_SLOW, LARGE_FAST):
         assert not scales.differences(own, scales.answers(scales.scaled(m, s), t_end * s.time, options, s))
 
 
-@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in EXACT])
-def test_steps_by_impulses_do_not_depend_on_the_unit_of_mass(name):
-    assert dict(scales.compared(CASES[name](), ["mass up", "mass down"])) == {"mass up": [], "mass down": []}
+QUICK = ("assemble", "mobility", "kinematics", "linearize", "modes", "singularities", "sensitivity instant")
+
+
+@pytest.mark.parametrize("name", [*EXAMPLES, *RANDOM])
+def test_other_analyses_in_other_units_answer_the_same(name):
+    m = CASES[name]()[0]
+    for analysis in (x for x in QUICK if (name, x) not in scales.UNDECIDED):
+        allowed = scales.ROUNDING if analysis in scales.ROUNDED else 0.0
+        own, *others = (
+            scales.scaled_answers.asked(analysis, scales.scaled(m, s), s)
+            for s in (scales.Scale(), SMALL_SLOW, LARGE_FAST)
+        )
+        for other in others:
+            assert not scales.differences(own, other, allowed)
+
+
+@pytest.mark.parametrize("name", [name for name in STEPPED if name not in EXACT])
+def test_compliant_contacts_do_not_depend_on_the_units_of_mass_and_time(name):
+    units = [u for u in scales.SCALES if not scales.is_exempt(name, u)]
+    assert units == ["mass up", "mass down", "time up", "time down"]
+    assert dict(scales.compared(CASES[name](), units)) == {u: [] for u in units}
 
 
 @pytest.mark.parametrize("name", scales.NOT_CONVERTED)

@@ -83,7 +83,10 @@ def spectrum(A: np.ndarray, uncertainty: MatrixUncertainty | None = None) -> Spe
     if not n:
         none = np.zeros(0, complex)
         return Spectrum(none, none, np.zeros((0, 0), complex), [], np.zeros(0, int), np.zeros(0, int), none.real, 0.0)
-    B, scale, w, left, right, residual = _balanced_eigenpairs(A)
+    # in natural units before the matrix is balanced, so that rounding does not depend on its units
+    unit = np.ones(n) if uncertainty is None else 2.0 ** np.round(np.log2(uncertainty.unit))
+    B, scale, w, left, right, residual = _balanced_eigenpairs(A / unit[:, None] * unit)
+    scale *= unit
     E = [(np.eye(n), ENTRY_ROUNDING * np.abs(B))]
     if uncertainty is not None:
         E.append((uncertainty.by / scale[:, None], uncertainty.size * scale))

@@ -17,6 +17,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.loads import force_row
 from ..errors import SingularityError
 from ..model.element import LawOf, fields_with
@@ -27,7 +28,7 @@ from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_ste
 from .force_balance import state_sizes
 from .output_derivatives import curve_gradients, snapshot
 
-OFFSET = 1e-6  # relative to the mechanism's length, in radians, or these per second
+OFFSET = 1e-6  # relative to the mechanism's length or a radian, or to these times its characteristic rate
 NEAR_FRACTION = 0.1
 PERSISTENT_FRACTION = 0.5  # of the difference at the full offset
 LAW_ROUNDING = 16.0 * np.finfo(float).eps
@@ -126,13 +127,18 @@ def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[Non
         shot = shot or snapshot(e.state)
         values = [("", np.array([_parameter_value(e, n)])) if n in to else shot.curve(n) for n in names]
         at = np.array([float(v[0]) for _, v in values])
-        sizes = np.array([e.state.c.values.length if unit.startswith("m") else 1.0 for unit, _ in values])
+        sizes = np.array([_natural_size(e.state.c, unit) for unit, _ in values])
         for k, name in enumerate(names):
             if name in states:
                 sizes[k] = state_sizes(e).change[states.index(name)]
         of = [*zip(names, at, values, sizes.tolist(), strict=True)]
         out += [_nonsmooth_point(e, element, text, of, *k, to) for k in nonsmooth_directions(law, at, sizes)]
     return out
+
+
+def _natural_size(c: CompiledMechanism, unit: str) -> float:
+    """Size of a quantity with that unit: the mechanism's length or 1, times its rate for velocities."""
+    return (c.values.length if unit.startswith("m") else 1.0) * (float(c.work.options.rate) if "/s" in unit else 1.0)
 
 
 def nonsmooth_directions(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray, str]]:

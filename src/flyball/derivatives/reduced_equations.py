@@ -69,7 +69,7 @@ def _sparse_solver(A) -> Callable[[np.ndarray], np.ndarray]:
 DENSE_ROWS = 150
 BASIS_ROUNDING = 1e-14  # basis entries below this are zero; the largest are about 1
 VANISHING = 1e-13  # forces or constraint entries below this part of the largest are rounding
-CLOSURE_TOLERANCE = 1e-10  # relative to the mechanism's length
+CLOSURE_TOLERANCE = 1e-10  # relative to the mechanism's length, or a radian
 CLOSURE_ITERATIONS = 20
 # Distance [rad, or mechanism lengths] of the nearby position whose constraint rank is compared.
 NEARBY_STEP = 1e-2
@@ -259,7 +259,7 @@ def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None
     rng = np.random.default_rng(0)
     for _ in range(2):
         a = f.Z @ (f.scale[f.chosen] * rng.standard_normal(f.Z.shape[1]))
-        a *= NEARBY_STEP / np.abs(a / f.scale).max()
+        a *= NEARBY_STEP / np.abs(a / c.sizes).max()
         G = _nearby_jacobian(c, x.t, x.q, a, f.scale)
         if G is not None and constraint_rank(G, f.scale) > here:
             of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
@@ -289,16 +289,11 @@ def _nearby_jacobian(
             retract(c.values.system, q, step)
             c.at(t, q, still)
             G, g = c.jacobian()[which], c.work.rows.value[which]
-            if np.abs(g).max(initial=0.0) < CLOSURE_TOLERANCE * c.values.length:
-                return np.vstack([G, prescribed_rows(c)])
-            step = (
-                -scale
-                * np.linalg.lstsq(
-                    np.vstack([G, prescribed_rows(c)]) * scale,
-                    np.r_[g, np.zeros(len(prescribed_rows(c)))],
-                    rcond=RANK_TOLERANCE,
-                )[0]
-            )
+            rows = np.vstack([G, prescribed_rows(c)])
+            if np.abs(g / c.row_units[which]).max(initial=0.0) < CLOSURE_TOLERANCE:
+                return rows
+            gaps = gap_lengths(np.r_[g, np.zeros(len(rows) - len(g))], rows, scale)
+            step = -scale * np.linalg.lstsq(normalised_rows(rows, scale), gaps, rcond=RANK_TOLERANCE)[0]
         return None
     finally:
         c.z = z
@@ -361,10 +356,14 @@ class TermSizes(NamedTuple):
 
 
 class MatrixUncertainty(NamedTuple):
-    """Uncertainty of a matrix A: A + by X, with any X whose entries do not exceed those of ``size``, (n, n)."""
+    """Uncertainty of a matrix A: A + by X, with any X whose entries do not exceed those of ``size``, (n, n).
+
+    ``unit``: natural sizes of the states, (n,).
+    """
 
     by: np.ndarray
     size: np.ndarray
+    unit: np.ndarray
 
 
 def remove_rounding(
@@ -418,7 +417,7 @@ def remove_rounding(
         own[np.abs(own) <= least] = 0.0
     by = np.eye(n)
     by[a:m, a:m] = inverse
-    return MatrixUncertainty(by, size)
+    return MatrixUncertainty(by, size, unit)
 
 
 def _fastest_rate(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float) -> float:

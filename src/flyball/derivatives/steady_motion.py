@@ -25,7 +25,13 @@ from ..tables.structure_definition import velocity_names
 from ..tables.table_definitions import System
 from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState, complex_step_derivative
 from .force_balance import force_magnitudes, residual_rounding, state_sizes
-from .reduced_equations import FreeCoordinates, TurningFrame, reduced_equations, static_equations
+from .reduced_equations import (
+    FreeCoordinates,
+    TurningFrame,
+    normalised_rows,
+    reduced_equations,
+    static_equations,
+)
 
 TURNING_TOLERANCE = 1e-9  # singular values below this part of the largest leave the frame's rotation undetermined
 IN_PLANE = (0, 1, 5)  # indices of x, y and the angle about z among the six coordinates of a body
@@ -60,12 +66,11 @@ def candidate_frames(x: MechanismState) -> list[TurningFrame]:
     right = np.r_[(a / length).ravel(), alpha.ravel()]
     p = fundamental_subspaces(A, TURNING_TOLERANCE)
     least, open_ = p.row_space @ ((p.span.T @ right) / p.values), p.null.T
-    turns = [least]
+    turns, fast = [least], max(np.abs(w).max(), np.abs(v).max() / length)
     for spin in w:
         other = least + open_.T @ (open_ @ (spin - least))
-        if min(np.abs(other - seen).max() for seen in turns) > TURNING_TOLERANCE * (1.0 + np.abs(w).max()):
+        if min(np.abs(other - seen).max() for seen in turns) > TURNING_TOLERANCE * fast:
             turns.append(other)
-    fast = max(np.abs(w).max(), np.abs(v).max() / length)
     turns = [np.where(np.abs(t) > TURNING_TOLERANCE * fast, t, 0.0) for t in turns]  # smaller components are rounding
     N = kinematic_matrix(x)
     return [TurningFrame(turning, turning_matrix(x, turning), N) for turning in turns]
@@ -150,27 +155,31 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
     """Whether accelerations and linear equations are unchanged a short time later, as seen from the frame."""
     from scipy.linalg import expm
 
-    size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
-    if not np.abs((x.vdot - frame.H @ x.v) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
+    sizes = x.c.sizes
+    size = np.abs(x.v / sizes).max() ** 2 + np.abs(x.vdot / sizes).max()
+    if not np.abs((x.vdot - frame.H @ x.v) / sizes).max() <= COEFFICIENT_TOLERANCE * size:
         return False  # the velocities do not just turn with the frame
     changes = continuous_rates(e) / state_sizes(e).change if e.nz else np.zeros(0)
     if not np.abs(changes).max(initial=0.0) <= COEFFICIENT_TOLERANCE * np.sqrt(size):
         return False
     tau, later = _advanced_state(x, frame)
     T = expm(tau * frame.H)
-    if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
+    if not np.abs((later.vdot - T @ x.vdot) / sizes).max() <= COEFFICIENT_TOLERANCE * size:
         return False
     then = EquationDerivatives(later)
     g = f.turned(T, then)
-    if np.abs(g.rows @ g.Zv).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(g.rows).max(initial=0.0) * np.abs(
-        g.Zv
-    ).max(initial=0.0):
+    motions = g.Zv / sizes[:, None] * sizes[f.chosen_v]
+    missed = normalised_rows(g.rows, sizes) @ motions
+    if np.abs(missed).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(motions).max(initial=0.0):
         return False
-    now = reduced_equations(e, f, frame).A
+    now = reduced_equations(e, f, frame)
     other = reduced_equations(
         then, g, TurningFrame(frame.turning, turning_matrix(later, frame.turning), kinematic_matrix(later))
-    ).A
-    return bool(np.abs(other - now).max(initial=0.0) <= COEFFICIENT_TOLERANCE * np.abs(now).max(initial=0.0))
+    )
+    assert now.uncertainty is not None
+    unit = now.uncertainty.unit
+    change, size = np.abs(other.A - now.A) * unit / unit[:, None], np.abs(now.A) * unit / unit[:, None]
+    return bool(change.max(initial=0.0) <= COEFFICIENT_TOLERANCE * size.max(initial=0.0))
 
 
 def is_still(x: MechanismState) -> bool:

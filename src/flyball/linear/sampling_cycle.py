@@ -136,7 +136,7 @@ def cycle_equations(
         state_units=tuple(space.state_units[i] for i in left), motion=space.motion[:, left],
     )  # fmt: skip
     rounded = EXPONENTIAL_ROUNDING * np.abs(out.A).max(axis=1, keepdims=True, initial=0.0) * np.ones(len(left))
-    found = spectrum(out.A, MatrixUncertainty(np.eye(len(left)), rounded))
+    found = spectrum(out.A, MatrixUncertainty(np.eye(len(left)), rounded, np.ones(len(left))))
     return replace(out, eigenvalues=found.values), found, cycle
 
 

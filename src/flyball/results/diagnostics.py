@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..engine.entry_point import characteristic_rate_within
 from ..engine.kinematics import quaternion_at
 from ..engine.loads import force_row
 from ..model.joint import Joint
@@ -299,7 +300,7 @@ MAX_VIOLATION = 1e-6  # relative to the mechanism's length: larger constraint vi
 MAX_ACCELERATION_VIOLATION = (
     1e-8  # relative acceleration error of constraints: reactions are wrong by up to 1e4 times it
 )
-REST_SPEED = 1e-7  # lengths of the mechanism per second that count as rest
+REST_SPEED = 1e-7  # speed that counts as rest, relative to the mechanism's length times its characteristic rate
 MIN_CREEP = 1e-3  # relative to the mechanism's length: larger creep is reported
 
 
@@ -514,8 +515,9 @@ def _rest_energy(x: EnergyBudget) -> float:
     """
     length, t = x.result.values.length, x.t
     rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
-    least = rounding + float(x.mass.sum()) * (REST_SPEED * length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0
+    slow = REST_SPEED * length * characteristic_rate_within(x.result.values.system, span)
+    least = rounding + float(x.mass.sum()) * slow**2
     if not x.works or not span > 0.0:
         return least
     return least + expected_imbalance(x.result) * float(x.mass @ x.travel**2) / max(span, 1e-150) ** 2

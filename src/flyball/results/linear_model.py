@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..engine.entry_point import characteristic_rate_within
 from ..errors import AnalysisError, ModelError, import_optional
 from ..model.model import listing, suggest
 from ..numerics.eigen import QuadraticPencil
@@ -367,7 +368,7 @@ class LinearModel:
         poles = self.eigenvalues
         pencil, E = np.block([[self.A, b], [c, d]]), np.zeros((n + 1, n + 1))
         E[:n, :n] = np.eye(n)
-        size = 1.0 + np.abs(poles).max(initial=0.0)
+        size = characteristic_rate_within(self.point.values.system) + np.abs(poles).max(initial=0.0)
         zeros = eigvals(pencil, E)
         zeros = zeros[np.isfinite(zeros)]
         zeros = zeros[np.abs(zeros) < 1e6 * size]

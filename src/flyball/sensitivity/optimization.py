@@ -331,11 +331,13 @@ def _number_array(values: Any, name: str, kind: type = float) -> np.ndarray:
 def _difference_gradient(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:
     """Derivatives of a function by the quantities, by central differences.
 
-    For complex quantities the derivatives by real and imaginary part are the real and imaginary part of the result.
+    Steps are relative to the largest value of each quantity. For complex quantities the derivatives by real and
+    imaginary part are the real and imaginary part of the result.
     """
-    out = np.zeros(values.shape, values.dtype)
+    out, size = np.zeros(values.shape, values.dtype), np.abs(values).max(axis=0)
+    size[size == 0.0] = 1.0
     for i in np.ndindex(values.shape):
-        h = DIFFERENCE_STEP * (1.0 + abs(values[i]))
+        h = DIFFERENCE_STEP * size[i[1:]]
         for way in (1.0, 1.0j) if np.iscomplexobj(values) else (1.0,):
             up, down = values.copy(), values.copy()
             up[i] += h * way

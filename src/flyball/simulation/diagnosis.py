@@ -189,6 +189,8 @@ def _unconstrained_accelerations(c: CompiledMechanism) -> np.ndarray:
 
 
 JUMP_WINDOW = 1e-10  # part of the time span within which jumps of a law are sought
+# change of a law, or of its rate times the span, that is none: relative to itself, and to the other of the two
+JUMP_ROUNDING, LAW_ROUNDING = 1e-7, 1e-12
 LOOKAHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law is evaluated
 LOCKED_RESIDUAL = 1e-3  # relative residual of the accelerations above which the mechanism is locked
 DISAGREEMENT = 1e-6  # relative difference of derivatives above which two laws of one coordinate disagree
@@ -272,7 +274,7 @@ def driver_fault(c: CompiledMechanism, t: float, span: float) -> str:
                 [evaluate_jet(S.code, S.const, law, stack, t + way * d * span, W.sensed, BY_TIME) for d in LOOKAHEAD]
                 for way in (1.0, -1.0)
             )
-        problem = _not_finite_law(ahead) or _jump_of_law(behind[0], ahead[0], JUMP_WINDOW * span, wrapped)
+        problem = _not_finite_law(ahead) or _jump_of_law(behind[0], ahead[0], span, wrapped)
         problem = problem or _unbounded_derivative(ahead, "after") or _unbounded_derivative(behind, "before")
         if problem:
             return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}{_law_texts(driver)}"
@@ -351,16 +353,18 @@ def _unbounded_derivative(near: list[tuple], when: str) -> str:
     return ""
 
 
-def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
+def _jump_of_law(before: tuple, after: tuple, span: float, wrapped: bool) -> str:
     """Describe a jump between value and derivatives just before and just after an instant; empty if there is none."""
     if not all(map(math.isfinite, before)):
         return ""
+    sizes = [span**k * (abs(before[k]) + abs(after[k])) for k in range(2)]
     for k, remedy in ((0, "step5(t, t0, 0, t1, 1) changes smoothly"), (1, "step5 or a cubic Table changes smoothly")):
         change = after[k] - before[k]
         if wrapped and k == 0:
             change = math.atan2(math.sin(change), math.cos(change))
         slope = max(abs(before[k + 1]), abs(after[k + 1]))
-        if abs(change) > JUMP_FACTOR * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
+        rounding = JUMP_ROUNDING * sizes[k] + LAW_ROUNDING * sizes[1 - k]
+        if span**k * abs(change) > JUMP_FACTOR * JUMP_WINDOW * span ** (k + 1) * slope + rounding:
             return (
                 f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which requires an "
                 f"infinite force; {remedy}"

@@ -467,8 +467,8 @@ def _final_state(before: Result, a: Assembly) -> np.ndarray:
 
 
 POSITION_CHANGE = 1e-6  # allowed change of position, relative to the mechanism's length, or [rad]
-VELOCITY_CHANGE_SHARE = 1e-4  # allowed change of velocity, relative to the largest velocity
-VELOCITY_CHANGE = 1e-5  # allowed violation of the velocity constraints [m/s, rad/s]
+VELOCITY_CHANGE_SHARE = 1e-4  # allowed change of velocity (lengths: the mechanism's), relative to the largest
+VELOCITY_CHANGE = 1e-5  # the same, relative to the characteristic rate: violation of the velocity constraints
 
 
 def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> None:
@@ -483,19 +483,24 @@ def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v
         return
     now = _body_states(c, t, q, v)
     size = c.values.length
-    off = dict(zip(_row_titles(c), np.abs(c.work.rows.value) / size, strict=True))
-    fast = {name: abs(x) for name, x in zip(_row_titles(c), c.jacobian() @ v - c.work.rows.nu, strict=True)}
-    most = max(np.abs(v).max(initial=0.0), np.abs(c.work.rows.nu).max(initial=0.0))
+    titles, unit = _row_titles(c), c.row_units
+    off = dict(zip(titles, np.abs(c.work.rows.value) / unit, strict=True))
+    fast = dict(zip(titles, np.abs(c.jacobian() @ v - c.work.rows.nu) / unit, strict=True))
+    most = max(np.abs(v / c.sizes).max(initial=0.0), np.abs(c.work.rows.nu / unit).max(initial=0.0))
     if c.structure.tree:
         then = _body_states(CompiledMechanism(before.values, before.final[1][len(q) + len(v) :].copy()), t, q, v)
         off |= {
             f"body {k!r}": max(_largest_size(x.p - then[k].p) / size, _largest_size(x.R - then[k].R))
             for k, x in now.items()
         }
-        fast |= {f"body {k!r}": _velocity_difference(x, then[k]) for k, x in now.items()}
-        most = max([most, *(_largest_size(np.r_[x.v, x.w]) for x in (*now.values(), *then.values()))])
+        fast |= {
+            f"body {k!r}": max(_largest_size(x.v - then[k].v) / size, _largest_size(x.w - then[k].w))
+            for k, x in now.items()
+        }
+        most = max([most, *(_largest_size(np.r_[x.v / size, x.w]) for x in (*now.values(), *then.values()))])
     _refuse_difference(before, c, off, POSITION_CHANGE, "", size)
-    _refuse_difference(before, c, fast, max(VELOCITY_CHANGE, VELOCITY_CHANGE_SHARE * most), " in velocity", 1.0)
+    allowed = max(VELOCITY_CHANGE * float(c.work.options.rate), VELOCITY_CHANGE_SHARE * most)
+    _refuse_difference(before, c, fast, allowed, " in velocity", size)
 
 
 def _body_states(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
@@ -515,10 +520,6 @@ def _row_titles(c: CompiledMechanism) -> list[str]:
 
 def _largest_size(x: np.ndarray) -> float:
     return float(np.abs(x).max(initial=0.0))
-
-
-def _velocity_difference(a: BodyState, b: BodyState) -> float:
-    return max(_largest_size(a.v - b.v), _largest_size(a.w - b.w))
 
 
 def _refuse_difference(

@@ -215,10 +215,10 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
     step = float(clock.real.step)
     if not step > 0.0 or method not in TABLEAUX:
         return ""
-    grown = np.r_[_growth(a, clock.y.current), _growth(a, clock.y.proposed)]
+    grown = np.r_[_growth(a, clock, clock.y.current), _growth(a, clock, clock.y.proposed)]
     if not len(grown) or not grown.max() > LARGE_GROWTH:
         return ""
-    longest, rate = longest_stable(a, tableau(method))
+    longest, rate = longest_stable(a, tableau(method), clock.y.unit)
     if not step > longest:
         return ""
     return (
@@ -230,7 +230,7 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
 
 def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
     """Return a message on a state variable that has grown beyond all bounds; empty if there is none."""
-    y, grown = clock.y.current, _growth(a, clock.y.current)
+    y, grown = clock.y.current, _growth(a, clock, clock.y.current)
     if not len(grown) or not grown.max() > UNBOUNDED_GROWTH:
         return ""
     i = int(np.argmax(grown))
@@ -316,15 +316,17 @@ def _likely_cause(a: Assembly, i: int) -> str:
     return f"{known} a force that grows without bound where the motion ended, as 1/r**2 does towards r = 0"
 
 
-def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:
+def longest_stable(a: Assembly, R: Tableau, unit: np.ndarray) -> tuple[float, float]:
     """Return the longest stable step [s] of a method at the start of a motion, and the rate [1/s] that limits it.
+
+    ``unit``: of each component of the state.
 
     Modes that grow by themselves are left out. Returns infinity and 0 if nothing limits the step, or there are too many
     state variables. The stability function of the method (Hairer and Wanner 1996, section IV.2) is evaluated at the
     eigenvalues of the Jacobian of (q, v, x)', where x are states of controllers; modes are held fixed.
     """
     n = _state_length(a)
-    J = _difference_jacobian(a, n) if 0 < n <= MOST_EIGENVALUES else np.zeros((1, 1))
+    J = _difference_jacobian(a, unit[:n]) if 0 < n <= MOST_EIGENVALUES else np.zeros((1, 1))
     if not np.isfinite(J).all():
         return np.inf, 0.0
     modes = np.linalg.eigvals(J)
@@ -351,11 +353,12 @@ def _stability_polynomial(R: Tableau) -> np.ndarray:
     return np.array(out)
 
 
-def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
-    """Return the derivatives of the first ``n`` rates by the state, by finite differences; the run's workspace is
-    unchanged.
+def _difference_jacobian(a: Assembly, unit: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the first rates by the state, by finite differences; the run's workspace is unchanged.
+
+    ``unit``: of each of these components of the state.
     """
-    c, y = a.compiled, a.y
+    c, y, n = a.compiled, a.y, len(unit)
     other = c.again()
     assign(other.work.modes, c.work.modes)
     assign(other.work.options, c.work.options)
@@ -368,15 +371,15 @@ def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
     here, out = rates(y.copy()), np.zeros((n, n))
     for k in range(n):
         x = y.copy()
-        x[k] += DIFFERENCE_STEP * max(abs(x[k]), 1.0)
+        x[k] += DIFFERENCE_STEP * max(abs(x[k]), unit[k])
         out[:, k] = (rates(x) - here) / (x[k] - y[k])
     return out
 
 
-def _growth(a: Assembly, y: np.ndarray) -> np.ndarray:
-    """Return coordinates, velocities and states relative to their initial values, or to 1; 0 for what is not finite."""
+def _growth(a: Assembly, clock: ex.StepState, y: np.ndarray) -> np.ndarray:
+    """Return a state relative to its initial values, or to its units; 0 for what is not finite."""
     n = _state_length(a)
-    return np.nan_to_num(np.abs(y[:n]), nan=0.0) / np.maximum(np.abs(a.y[:n]), 1.0)
+    return np.nan_to_num(np.abs(y[:n]), nan=0.0) / np.maximum(np.abs(a.y[:n]), clock.y.unit[:n])
 
 
 def _state_length(a: Assembly) -> int:

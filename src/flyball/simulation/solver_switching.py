@@ -490,8 +490,9 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
     n, parts = s.nq + s.nv + len(s.controls) - len(s.sampled), [slice(0, s.nq), slice(s.nq, s.nq + s.nv)]
     if n > s.nq + s.nv:
         parts.append(slice(s.nq + s.nv, n))
-    unit, size = np.ones(n), np.maximum(np.abs(y[:n]), 1.0)
-    unit[parts[1]] = pace
+    unit = clock.y.unit[:n].copy()
+    size = np.maximum(np.abs(y[:n]), unit)
+    unit[parts[1]] *= pace / c.work.options.rate
     rates = _rate_function(c, float(clock.real.t), n)
     here = rates(y)
 

@@ -60,8 +60,9 @@ from .stability import RestState
 
 SETTLING_STEPS = 40_000
 SETTLING_TRAVEL = 20.0  # travel, in lengths of the mechanism, after which settling has failed
-# Step size relative to the time in which the smallest shape falls by its own size.
-STEP_FRACTION = 0.04
+# Step size relative to the time in which the smallest shape falls by its own size (without gravity: to that of the
+# characteristic rate), and residual of velocities relative to the speed of that fall in a step.
+STEP_FRACTION, VELOCITY_RESIDUAL = 0.04, 1e-9
 REST_ACCELERATION = 1e-7  # acceleration at rest, relative to the acceleration without contact
 SETTLING_ITERATIONS = 400
 
@@ -88,11 +89,12 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
     refuse_unknown_surfaces(scene)
     free = len(scene.carriers.mass) - len(found.held)
     held = separate_mechanism(values, base.t, parameters, found, free)
-    gravity = float(np.linalg.norm(values.system.gravity))
-    h = STEP_FRACTION * math.sqrt(smallest_radius(scene, values) / gravity) if gravity > 0.0 else 5e-3
+    size, rate = smallest_radius(scene, values), float(base.compiled.work.options.rate)
+    fall = float(np.linalg.norm(values.system.gravity)) or size * rate * rate
+    h = STEP_FRACTION * math.sqrt(size / fall)
     o = Stepping(
         step=h,
-        tolerance=1e-9 * (gravity or 1.0) * h,
+        tolerance=VELOCITY_RESIDUAL * fall * h,
         iterations=SETTLING_ITERATIONS,
         position_iterations=SETTLING_ITERATIONS,
     )

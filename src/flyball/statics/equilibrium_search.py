@@ -431,7 +431,7 @@ def _steady_step(x: MechanismState, at: list[int], free: list[int]) -> tuple[Mec
     way[moving] = scale[moving] * step[:m] * part
     q, v = x.q.copy(), x.v.copy()
     retract(c.values.system, q, way)
-    v[free] += (1.0 + np.abs(v[free])) * step[m : m + k] * part
+    v[free] += _speed_sizes(x, free) * step[m : m + k] * part
     c.at(x.t, q, v)
     lam, effort = x.lam + size * step[m + k : m + k + rows], x.effort + given.T @ (size * step[m + k + rows :])
     return replace(x, q=q, v=v, z=c.z.copy(), lam=lam, effort=effort), longest
@@ -448,7 +448,7 @@ def _steady_equations(
     D, G = e.by_velocity[r].toarray(), e.by_velocity[n].toarray()
     which = np.array([row.holonomic for row in s.rows], bool)
     size = np.abs(K * np.outer(scale, scale)).max(initial=1e-300) + np.abs(scale * e.block("r")).max(initial=0.0)
-    by_place, by_speed = scale[moving], 1.0 + np.abs(x.v[free])
+    by_place, by_speed = scale[moving], _speed_sizes(x, free)
     width = len(moving) + len(free)
     A = np.zeros((s.nv + which.sum() + len(s.rows), width + len(s.rows) + len(given)))
     forces, gaps, rates = np.split(A, [s.nv, s.nv + which.sum()])
@@ -459,6 +459,11 @@ def _steady_equations(
     gaps[:, : len(moving)] = G[which][:, moving] * by_place / length
     rates[:, :width] = np.hstack([V[:, moving] * by_place, G[:, free] * by_speed])
     return A, np.r_[scale * e.block("r") / size, e.block("g")[which] / length, e.block("n")], float(size)
+
+
+def _speed_sizes(x: MechanismState, free: list[int] | np.ndarray) -> np.ndarray:
+    """Natural sizes of some velocities: themselves, and the mechanism's length (or a radian) times its rate."""
+    return np.asarray(x.c.sizes[free] * x.c.work.options.rate + np.abs(x.v[free]))
 
 
 def _body_of_velocity(s: Structure, d: int) -> int:

@@ -17,6 +17,7 @@ from ...compiler.struct_layout import Float1, Int1
 from .admm import admm
 from .apgd import apgd, scaled_apgd
 from .barzilai_borwein import barzilai_borwein
+from .contact_operator import contact_range, contact_velocity, line_range, line_velocity
 from .contact_problem import (
     CONVERGED,
     LIMIT_REACHED,
@@ -42,10 +43,8 @@ SMALL_ISLAND_SOLVER, OTHER_SOLVER, SOLVER_SLOTS = range(3)
 # number of contacts of all islands above which they are a crowd: in a crowd contacts are new in every step, and
 # Newton's method has no warm start
 MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, LIMITS = range(6)
-NEWTON_TOLERANCE_FACTOR, MIN_NEWTON_TOLERANCE = (
-    1e-5,
-    1e-10,
-)  # relative to the requested residual; and lower bound [m/s], because of rounding
+NEWTON_TOLERANCE_FACTOR = 1e-5  # residual of Newton's method, relative to the one requested
+VELOCITY_ROUNDING = 1e-11  # lower bound of that residual, relative to the largest velocity, because of rounding
 UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island above which sweeps converge too slowly
 CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # limits of a small island in a crowd
 # entries of IslandSolver.told, summed over calls: calls, islands, islands by the small-island solver and by the other,
@@ -199,6 +198,21 @@ def worst_outcome(O, sofar):
 
 
 @formula
+def largest_velocity(P, X, O):
+    """Largest velocity of the rows of an island without impulses, including biases [m/s]."""
+    out = 0.0
+    first, last = contact_range(P, O)
+    for c in range(first, last):
+        u = contact_velocity(P, X.v, X.wide, c)
+        for i in range(3):
+            out = max(out, abs(u[i] + P.bias[c, i]))
+    first, last = line_range(P, O)
+    for k in range(first, last):
+        out = max(out, abs(line_velocity(P, X.wide, k) + P.line_law.bias[k]))
+    return out
+
+
+@formula
 def solve_small_island(P, X, W, O, F, f):
     """Solve an island by the solver of small ones, or by the other one if that fails.
 
@@ -206,7 +220,8 @@ def solve_small_island(P, X, W, O, F, f):
     contacts then do not creep. Missing the smaller tolerance is no failure.
     """
     enough, most = O.real.enough, O.count.most
-    O.real.enough = max(NEWTON_TOLERANCE_FACTOR * enough, min(enough, MIN_NEWTON_TOLERANCE))
+    rounding = VELOCITY_ROUNDING * largest_velocity(P, X, O)
+    O.real.enough = max(NEWTON_TOLERANCE_FACTOR * enough, min(enough, rounding))
     if O.count.most_steps > 0:
         O.count.most = O.count.most_steps
     call(F.doors[SMALL_ISLAND_SOLVER], P, X, W, O, f, 0)

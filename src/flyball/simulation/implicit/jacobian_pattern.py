@@ -326,7 +326,7 @@ def substitute_inertias(c: CompiledMechanism) -> np.ndarray:
     missing = (own[:, 0] <= NO_INERTIA * own[:, -1]) | (mass == 0.0)
     if not missing.any():
         return out[:0]
-    least = mass[mass > 0.0].min(initial=1.0)
+    least = mass[mass > 0.0].min() if mass.any() else 1.0
     for b in np.flatnonzero(missing):
         at = slice(S.tree.v[b], S.tree.v[b] + S.tree.nv[b])
         out[at] = SLIGHT_INERTIA * max(mass[b], least) * (c.values.length / c.sizes[at]) ** 2

@@ -179,7 +179,9 @@ def spring_impulse(A, h, i, before, change):
 
 LENGTH_ITERATIONS = 3
 STIFF_SHARE = 1e-3  # implicit share b above which the length of a spring is corrected
-LENGTH_TOLERANCE = 1e-12  # negligible change of a spring's length, relative to itself or a radian
+LENGTH_TOLERANCE = (
+    1e-12  # negligible change of a spring's length, relative to itself and to the mechanism's length or a radian
+)
 
 
 @formula
@@ -201,6 +203,15 @@ def spring_length(A, i):
     """`force_length` of spring i of the step."""
     x = A.springs
     return force_length(A.S, A.W, int(x.force[i]), int(x.directions[i]), int(x.direction[i]))
+
+
+@formula
+def length_unit(A, i):
+    """Return the mechanism's length, or a radian if `spring_length` of spring i is an angle."""
+    k = int(A.springs.force[i])
+    if A.S.forces.family[k] == 1:
+        return A.S.units[A.S.forces.F[k]]
+    return A.S.scales.length if A.springs.direction[i] < 3.0 else 1.0
 
 
 @formula
@@ -252,7 +263,7 @@ def correct_spring_lengths(A):
             x = A.springs
             told = x.length[i] + dot_rows(A.spring_J[i], A.velocities.displacement) + 0.125 * h * h * x.bias[i]
             x.solution[i] = spring_length(A, i) - told
-            worst = max(worst, abs(x.solution[i]) / (1.0 + abs(told)))
+            worst = max(worst, abs(x.solution[i]) / (length_unit(A, i) + abs(told)))
         if not LENGTH_TOLERANCE < worst < 1.0:
             return
         solve_springs(A)

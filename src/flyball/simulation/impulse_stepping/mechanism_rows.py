@@ -39,6 +39,12 @@ def line_group(A, k):
 
 
 @formula
+def line_lever(A, k):
+    """Return the lever [m] that turns the rate of single row k into a velocity [m/s]; 1 if it is one already."""
+    return A.S.scales.length / A.S.units[A.line.quantity[k]]
+
+
+@formula
 def line_rate(A, k, v):
     """Return the rate of the quantity of single row k at velocities v."""
     s = 0.0
@@ -57,15 +63,16 @@ def stop_gap(A, k, side):
 
 @formula
 def line_acts(A, k, side):
-    """Return whether single row k acts in this step; of two stops the nearer one always does, since impacts may reach
-    it.
+    """Return whether single row k acts in this step.
+
+    Of two stops the nearer one always does, since impacts may reach it. The other one does if the motion, or the
+    correction of an overrun, may reach it.
     """
     if A.line.kind[k] != LINE_STOP:
         return side > 0
+    gap, other = stop_gap(A, k, side), stop_gap(A, k, -side)
     r, dr = line_rate(A, k, A.velocities.before), line_rate(A, k, A.velocities.change)
-    if stop_gap(A, k, side) < stop_gap(A, k, -side):
-        return True
-    return stop_gap(A, k, side) < STOP_LOOKAHEAD * A.real.step * (abs(r) + abs(dr)) + 1e-9
+    return gap <= other or gap < STOP_LOOKAHEAD * (A.real.step * (abs(r) + abs(dr)) + max(0.0, -other))
 
 
 @formula
@@ -92,13 +99,14 @@ def line_rows(A, P, used, jobs, write):
 
 @formula
 def line_row(A, P, k, g, where):
-    """Write the gradient of the quantity of single row k, reversed for an upper stop."""
+    """Write the gradient of the quantity of single row k times its lever, reversed for an upper stop."""
     at, size, side = where
+    lever = side * line_lever(A, k)
     for d in range(size):
         P.J[at + d] = 0.0
     r = A.S.rows.law.shape[0] + A.line.quantity[k]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
-        P.J[at + A.S.column[e] - A.group[g]] += side * A.W.G[e]
+        P.J[at + A.S.column[e] - A.group[g]] += lever * A.W.G[e]
 
 
 @formula
@@ -112,9 +120,9 @@ def line_laws(A, P, n):
         x = P.line_law
         P.line_at[i, 0], P.line_at[i, 1] = A.active.group[i], A.active.first[i]
         x.bias[i], x.soft[i], x.lower[i], x.upper[i] = 0.0, 0.0, 0.0, INFINITE
-        rate = side * line_rate(A, k, A.velocities.before)
         if A.line.kind[k] == LINE_STOP:
-            gap = stop_gap(A, k, side)
+            lever = line_lever(A, k)
+            rate, gap = lever * side * line_rate(A, k, A.velocities.before), lever * stop_gap(A, k, side)
             hit = rate < 0.0 and gap + h * rate <= 0.0
             x.bias[i] = A.line_law.restitution[k] * rate if hit else max(gap, 0.0) / h
         elif A.line.kind[k] == LINE_ROPE:
@@ -126,7 +134,7 @@ def line_laws(A, P, n):
 @formula
 def friction_law(A, P, i, k, x):
     """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
-    h = A.real.step
+    h, lever = A.real.step, line_lever(A, k)
     g, at = A.active.group[i], A.active.first[i]
     w = 0.0
     for d in range(A.group[g + 1] - A.group[g]):
@@ -134,9 +142,9 @@ def friction_law(A, P, i, k, x):
     t, arm, load = A.real.time + 0.5 * h, A.line_law.arm[k], A.line_law.load[k]
     rate = line_rate(A, k, A.velocities.before)
     held = h * static_friction_limit(A.S, A.W, A.line.force[k], t, arm, load)
-    if abs(rate) > REST_SHARE * held * w:
+    if lever * abs(rate) > REST_SHARE * held / lever * w:
         held = h * dry_friction(A.S, A.W, A.line.force[k], t, rate, arm, load)
-    x.lower[i], x.upper[i] = -held, held
+    x.lower[i], x.upper[i] = -held / lever, held / lever
 
 
 @formula
@@ -166,7 +174,8 @@ def account_lines(A, P, X):
     for i in range(P.size[3]):
         k = abs(A.active.line[i]) - 1
         side = 1.0 if A.active.line[i] > 0 else -1.0
-        work = X.line[i] * side * 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
+        impulse = X.line[i] * side * line_lever(A, k)
+        work = impulse * 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
         if A.line.kind[k] == LINE_STOP:
             A.real.lost -= work
         else:
@@ -174,7 +183,7 @@ def account_lines(A, P, X):
             if A.S.forces.work[f] >= 0:
                 z = A.S.sizes.coordinates + A.velocities.before.shape[0] + A.S.forces.work[f]
                 A.clock.K[0, z] += work / A.real.step
-            A.line_law.reaction[k] = X.line[i] * side / A.real.step
+            A.line_law.reaction[k] = impulse / A.real.step
     update_friction_loads(A)
 
 
@@ -203,7 +212,7 @@ def keep_stops_only(A, P, X):
         x.soft[i] = x.lower[i] = x.upper[i] = 0.0
         if A.line.kind[k] == LINE_STOP:
             mean = 0.5 * (line_rate(A, k, A.velocities.before) + line_rate(A, k, A.velocities.after))
-            gap = stop_gap(A, k, side) + A.real.step * side * mean
+            gap = line_lever(A, k) * (stop_gap(A, k, side) + A.real.step * side * mean)
             A.real.overrun = min(A.real.overrun, gap)
             x.bias[i], x.upper[i] = gap / A.real.step, INFINITE
 

@@ -167,11 +167,11 @@ def change_residual(A, h):
 @formula
 def change_converged(A):
     """Return whether the change of velocities has converged."""
-    size = 1e-300
-    worst = 0.0
+    size, worst = 0.0, 0.0
     for d in range(A.velocities.before.shape[0]):
-        size = max(size, abs(A.velocities.before[d]) + abs(A.velocities.change[d]))
-        worst = max(worst, abs(A.mixing[RESIDUAL_ROW, d]))
+        unit = A.S.velocity_units[d]
+        size = max(size, (abs(A.velocities.before[d]) + abs(A.velocities.change[d])) / unit)
+        worst = max(worst, abs(A.mixing[RESIDUAL_ROW, d]) / unit)
     return worst <= VELOCITY_CHANGE_TOLERANCE * size
 
 
@@ -186,7 +186,7 @@ def next_guess(A, n):
             C[i, j] = 0.0
         C[i, MIXED_GUESSES] = 0.0
         for d in range(now.shape[0]):
-            a = now[d] - mixing[MISSED_ROWS + i, d]
+            a = (now[d] - mixing[MISSED_ROWS + i, d]) / (A.S.velocity_units[d] * A.S.velocity_units[d])
             C[i, MIXED_GUESSES] += a * now[d]
             for j in range(i + 1):
                 C[i, j] += a * (now[d] - mixing[MISSED_ROWS + j, d])
@@ -392,10 +392,11 @@ def apply_step_impulses(A, P, X):
 @formula
 def velocities_changed(A):
     """Return whether contacts or single rows changed the velocities."""
-    size, change = 1e-300, 0.0
+    size, change = 0.0, 0.0
     for d in range(A.velocities.before.shape[0]):
-        size = max(size, abs(A.velocities.before[d]) + abs(A.velocities.after[d]))
-        change = max(change, abs(A.velocities.impulsive[d]))
+        unit = A.S.velocity_units[d]
+        size = max(size, (abs(A.velocities.before[d]) + abs(A.velocities.after[d])) / unit)
+        change = max(change, abs(A.velocities.impulsive[d]) / unit)
     return change > NO_VELOCITY_CHANGE * size
 
 

@@ -410,7 +410,7 @@ def _sensor_bodies(sensor) -> list[str]:
 
 CONTACT_MARGIN = 0.01  # gap up to which non-approaching shapes are in contact, relative to the smallest shape
 NO_OVERLAP = 1e-9  # negligible overlap, relative to the smallest shape
-SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
+SLOW_CONTACT = 0.1  # speed below which nothing bounces, whatever gravity is, relative to the tolerance of velocities
 DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
 """Default largest number of iterations by solver; `OTHER_ITERATIONS` for the others."""
 COARSE_FACTOR = 100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
@@ -447,7 +447,7 @@ def make_stepper(
     state = initial_run_state(values.system.gravity)
     options, tolerances = state.options, state.tolerances
     size = smallest_radius(scene, values)
-    tolerances.rebound_speed, tolerances.overlap = SLOW_CONTACT, NO_OVERLAP * size
+    tolerances.rebound_speed, tolerances.overlap = SLOW_CONTACT * o.tolerance, NO_OVERLAP * size
     tolerances.velocity = tolerances.position = o.tolerance
     tolerances.reported = max(float(np.sqrt((state.gravity**2).sum())), COARSE_FACTOR * o.tolerance / o.longest)
     usual = DEFAULT_ITERATIONS.get(o.solver, OTHER_ITERATIONS)

@@ -281,7 +281,7 @@ class LinearEquations(SymbolTable):
         return names.index(name)
 
 
-REST_TOLERANCE = 1e-12  # [1/s]: smaller rates are rounding
+REST_TOLERANCE = 1e-12  # relative to the characteristic rate: smaller rates are rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -417,7 +417,8 @@ def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMecha
         x, _ = operating_state(model, o.at, coordinates=o.coordinates, parameters=o.parameters)
         values = dict(x.c.parameters)
         m = trace_mechanism(model, x.c.structure.tree, o.inputs, values)
-        v = x.v if np.abs(x.v / x.c.sizes).max(initial=0.0) > REST_TOLERANCE else 0.0 * x.v
+        moves = np.abs(x.v / x.c.sizes).max(initial=0.0) > REST_TOLERANCE * x.c.work.options.rate
+        v = x.v if moves else 0.0 * x.v
         return m, OperatingPoint(x.q.tolist(), v.tolist(), x.z.tolist(), x.t)
     tree = o.tree
     if tree is None:
