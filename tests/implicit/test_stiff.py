@@ -21,7 +21,7 @@ def bushing(damping, *more):
 
 def clock_at(start):
     real, y = ex.StepReals.blank(), np.zeros((ex.STATE_ROWS, len(start.y)))
-    y[ex.CURRENT] = start.y
+    y[ex.CURRENT], y[ex.UNIT] = start.y, 1.0
     return ex.StepState(real, ex.StepCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 
