@@ -21,7 +21,7 @@ def bushing(damping, *more):
 
 def clock_at(start):
     real, y = ex.StepReals.blank(), ex.StateVectors.blank(len(start.y))
-    y.current = start.y
+    y.current, y.unit = start.y, 1.0
     return ex.StepState(real, ex.StepCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 

@@ -172,14 +172,13 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
     missed = normalised_rows(g.rows, sizes) @ motions
     if np.abs(missed).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(motions).max(initial=0.0):
         return False
-    now = reduced_equations(e, f, frame)
+    now = reduced_equations(e, f, frame).A
     other = reduced_equations(
         then, g, TurningFrame(frame.turning, turning_matrix(later, frame.turning), kinematic_matrix(later))
-    )
-    assert now.uncertainty is not None
-    unit = now.uncertainty.unit
-    change, size = np.abs(other.A - now.A) * unit / unit[:, None], np.abs(now.A) * unit / unit[:, None]
-    return bool(change.max(initial=0.0) <= COEFFICIENT_TOLERANCE * size.max(initial=0.0))
+    ).A
+    unit = np.r_[sizes[f.chosen], np.sqrt(size) * sizes[f.chosen_v], state_sizes(e).change if e.nz else []]
+    change, most = (np.abs(A * unit / unit[:, None]).max(initial=0.0) for A in (other - now, now))
+    return bool(change <= COEFFICIENT_TOLERANCE * most)
 
 
 def is_still(x: MechanismState) -> bool:

@@ -44,7 +44,7 @@ SMALL_ISLAND_SOLVER, OTHER_SOLVER, SOLVER_SLOTS = range(3)
 # Newton's method has no warm start
 MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, LIMITS = range(6)
 NEWTON_TOLERANCE_FACTOR = 1e-5  # residual of Newton's method, relative to the one requested
-VELOCITY_ROUNDING = 1e-11  # lower bound of that residual, relative to the largest velocity, because of rounding
+VELOCITY_ROUNDING = 1e-13  # lower bound of that residual, relative to the largest velocity, because of rounding
 UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island above which sweeps converge too slowly
 CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # limits of a small island in a crowd
 # entries of IslandSolver.told, summed over calls: calls, islands, islands by the small-island solver and by the other,
