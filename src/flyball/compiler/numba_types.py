@@ -67,7 +67,7 @@ class _ArrayReader:
         """Length of dimension k."""
         if self.part is not None and k == self.array.ndim - 1 and self.part.count > 1:
             return INTEGER(self.part.count)
-        return self.word(HEAD // 8 + k)
+        return self.word(HEAD // 8 + k + (self.part is not None and self.part.vector))
 
     def data(self) -> Any:
         """Address of the numbers."""
@@ -98,7 +98,12 @@ class _ArrayReader:
     def element(self, indices: list[Any]) -> Any:
         """Address of an element; of the first of a row if the last index is left out."""
         if self.part is not None:
-            return self.builder.gep(self.data(), [self.part.place(self.builder, indices)], inbounds=True)
+            if self.part.vector:
+                before = self.builder.mul(self.shape(0), self.shape(0).type(self.part.first))
+                indices = [self.builder.add(indices[0], before)]
+            else:
+                indices = [self.part.place(self.builder, indices)]
+            return self.builder.gep(self.data(), indices, inbounds=True)
         flat = indices[0]
         for k in range(1, self.array.ndim):
             flat = self.builder.mul(flat, self.shape(k))
@@ -123,11 +128,12 @@ class _ArrayReader:
 
 
 class _Part(NamedTuple):
-    """Entries of a record: first number, count, length of a row (0: the record is one row)."""
+    """Entries of a record: first number, count, length of a row (0: the record is one row), whether it is a row."""
 
     first: int
     count: int
     width: int
+    vector: bool
 
     def place(self, builder: Any, indices: list[Any]) -> Any:
         """Place of a number in the record's array; without a last index, of the first of its row."""
@@ -215,7 +221,8 @@ class PartReference(Reference):
     def __init__(self, record: Any, name: str) -> None:
         (first, count), ndim = record.entries[name], record.ndim
         self.layout, self.entries = (record.layout, name), {}
-        self.part = _Part(first, count, record.layout.of.layout.width if ndim == 2 else 0)
+        form = record.layout.of.layout
+        self.part = _Part(first, count, form.width if ndim == 2 else 0, form.vectors)
         self.array = types.Array(record.dtype, ndim if count > 1 else 1, "C")
         self.dtype, self.ndim = record.dtype, self.array.ndim
         types.Type.__init__(self, name=f"{record.name}.{name}")
@@ -249,7 +256,7 @@ class _ArrayAttributes(AttributeTemplate):  # type: ignore[misc]
     def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
         if attr not in typ.entries:
             return None
-        if typ.layout.of.layout.vectors:
+        if attr in typ.layout.of.layout.arrays:
             return types.Array(typ.dtype, 1, "C")
         return typ.dtype if typ.ndim == 1 and typ.entries[attr][1] == 1 else PartReference(typ, attr)
 
@@ -296,7 +303,7 @@ def _shape(context: Any, builder: Any, typ: Any, value: Any) -> Any:
 def _get_entry(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
     first, count = typ.entries[name]
     place, index = _ArrayReader(context, builder, typ, value), context.get_constant(types.intp, first)
-    if typ.layout.of.layout.vectors:
+    if name in typ.layout.of.layout.arrays:
         return place.row(types.Array(typ.dtype, 1, "C"), index)
     return value if typ.ndim > 1 or count > 1 else load_item(context, builder, typ.array, place.element([index]))
 

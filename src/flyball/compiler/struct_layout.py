@@ -81,6 +81,7 @@ class RecordForm(NamedTuple):
     kind: str  # of number
     rows: bool  # whether there is a row of them for each element
     vectors: bool  # whether each is a row of the array
+    arrays: frozenset[str]  # rows that are arrays
 
 
 class Record(np.ndarray):
@@ -89,8 +90,8 @@ class Record(np.ndarray):
     ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
     annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
     each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``. With ``vectors=True`` each entry is a row
-    of the array, of any length; the array may have further rows. `Annotated[np.ndarray, "mass"]` is another name of
-    ``mass``.
+    of the array, of any length: annotated as `Column` it is read number by number, as `Float1` it is an array. There
+    may be further rows. ``Annotated[np.ndarray, "mass"]`` is another name of ``mass``.
     """
 
     layout: ClassVar[RecordForm]
@@ -105,7 +106,8 @@ class Record(np.ndarray):
             first, count = entries[name] = entries[other[1]] if other else (width, int(several[1]) if several else 1)
             width = max(width, first + count)
             setattr(cls, name, _entry_property(first, count, rows, vectors))
-        cls.layout = RecordForm(entries, width, kind, rows, vectors)
+        arrays = frozenset(k for k, text in cls.__annotations__.items() if text == "Float1")
+        cls.layout = RecordForm(entries, width, kind, rows, vectors, arrays)
 
     @classmethod
     def blank(cls, *count: int) -> Any:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.formulas import formula
-from ...compiler.struct_layout import Column, Float1, Float2, Int1, Record
+from ...compiler.struct_layout import Float1, Float2, Int1, Record
 
 # StepCounts.started if no segment has begun, but only forces have jumped at its start
 FORCES_JUMPED = 2
@@ -82,14 +82,14 @@ class StepCounts(Record, kind="Int"):
 class StateVectors(Record, kind="Float", vectors=True):
     """States of an integration [(ny,)]."""
 
-    current: Column
-    proposed: Column
-    interpolated: Column
-    saved: Column  # by trials
-    saved_rate: Column
-    previous: Column  # of the previous step
-    previous_rate: Column
-    unit: Column  # unit of each component
+    current: Float1
+    proposed: Float1
+    interpolated: Float1
+    saved: Float1  # by trials
+    saved_rate: Float1
+    previous: Float1  # of the previous step
+    previous_rate: Float1
+    unit: Float1  # unit of each component
 
 
 class StepState(NamedTuple):
