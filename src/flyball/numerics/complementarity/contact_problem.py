@@ -90,6 +90,7 @@ class SettingReals(Record, kind="Float"):
     enough: float  # residual [m/s] at which a solve has converged
     residual: float  # residual reached, as a velocity [m/s],
     force_residual: float  # and as a force: missing impulse over the largest impulse [1]
+    acceptable: float  # residual that suffices where rounding does not let it become smaller [m/s]
 
 
 class SolverSettings(NamedTuple):

@@ -74,6 +74,7 @@ RHO_MARGIN, MAX_STEPS_AT_RHO = 1.0, 12  # see `next_rho`; steps at one complianc
 SLOW_CHANGE = 0.05  # ratio of successive changes of impulses above which the compliance decreases
 LINE_SEARCH_TOLERANCE = 0.1  # remaining part of the slope along a step at which the line search ends
 MAX_LINE_SEARCHES, MAX_HALVINGS = 30, 4
+VELOCITY_ROUNDING = 1e-13  # residual that rounding leaves, relative to the largest velocity that an impulse causes
 
 
 @formula
@@ -215,9 +216,26 @@ def update_multipliers(R, coulomb):
 
 
 @formula
+def largest_velocity(R):
+    """Largest velocity without impulses, or caused by a multiplier in its own row [m/s]."""
+    s = 0.0
+    for row in range(R.size[ROWS]):
+        o = ROW_NUMBERS * row
+        for k in range(3):
+            s = max(s, abs(R.row[o + FREE_VELOCITY + k]), R.row[o + MOBILITY] * abs(R.row[o + MULTIPLIER + k]))
+    return s
+
+
+@formula
+def tolerance(R, O):
+    """Residual at which the iteration ends: the requested one, or an acceptable one that is mostly rounding [m/s]."""
+    return max(O.real.enough, min(O.real.acceptable, VELOCITY_ROUNDING * largest_velocity(R)))
+
+
+@formula
 def iterate_newton(R, O, coulomb, law, steps):
     """Take Newton steps at fixed multipliers: (outcome, residual, change of the multipliers, steps)."""
-    enough, last = O.real.enough, steps + MAX_STEPS_AT_RHO
+    enough, last = tolerance(R, O), steps + MAX_STEPS_AT_RHO
     while True:
         set_impulses(R)
         (worst, O.real.force_residual), near, change = convergence_measures(R, coulomb)
@@ -238,17 +256,6 @@ def iterate_newton(R, O, coulomb, law, steps):
         if law and a == 0.0:
             return STALLED, worst, change, steps
         take_step(R, a)
-
-
-@formula
-def largest_velocity(R):
-    """Largest velocity without impulses, or caused by a multiplier in its own row [m/s]."""
-    s = 0.0
-    for row in range(R.size[ROWS]):
-        o = ROW_NUMBERS * row
-        for k in range(3):
-            s = max(s, abs(R.row[o + FREE_VELOCITY + k]), R.row[o + MOBILITY] * abs(R.row[o + MULTIPLIER + k]))
-    return s
 
 
 @formula
@@ -296,7 +303,7 @@ def iterate_multipliers(R, O, coulomb, worst):
                 law, before, rho = False, 1e300, min(RHO_INCREASE * rho, MAX_RHO)
                 continue
         update_multipliers(R, coulomb)
-        if ended == LIMIT_REACHED or ended == SOLVE_FAILED or worst <= O.real.enough:
+        if ended == LIMIT_REACHED or ended == SOLVE_FAILED or worst <= tolerance(R, O):
             return ended, worst
         best, force, law = worst, O.real.force_residual, coulomb > 0.0
         if ended == STALLED:

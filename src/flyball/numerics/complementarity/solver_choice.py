@@ -17,7 +17,6 @@ from ...compiler.struct_layout import Float1, Int1
 from .admm import admm
 from .apgd import apgd, scaled_apgd
 from .barzilai_borwein import barzilai_borwein
-from .contact_operator import contact_range, contact_velocity, line_range, line_velocity
 from .contact_problem import (
     CONVERGED,
     LIMIT_REACHED,
@@ -44,7 +43,6 @@ SMALL_ISLAND_SOLVER, OTHER_SOLVER, SOLVER_SLOTS = range(3)
 # Newton's method has no warm start
 MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, LIMITS = range(6)
 NEWTON_TOLERANCE_FACTOR = 1e-5  # residual of Newton's method, relative to the one requested
-VELOCITY_ROUNDING = 1e-13  # lower bound of that residual, relative to the largest velocity, because of rounding
 UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island above which sweeps converge too slowly
 CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # limits of a small island in a crowd
 # entries of IslandSolver.told, summed over calls: calls, islands, islands by the small-island solver and by the other,
@@ -198,21 +196,6 @@ def worst_outcome(O, sofar):
 
 
 @formula
-def largest_velocity(P, X, O):
-    """Largest velocity of the rows of an island without impulses, including biases [m/s]."""
-    out = 0.0
-    first, last = contact_range(P, O)
-    for c in range(first, last):
-        u = contact_velocity(P, X.v, X.wide, c)
-        for i in range(3):
-            out = max(out, abs(u[i] + P.bias[c, i]))
-    first, last = line_range(P, O)
-    for k in range(first, last):
-        out = max(out, abs(line_velocity(P, X.wide, k) + P.line_law.bias[k]))
-    return out
-
-
-@formula
 def solve_small_island(P, X, W, O, F, f):
     """Solve an island by the solver of small ones, or by the other one if that fails.
 
@@ -220,12 +203,11 @@ def solve_small_island(P, X, W, O, F, f):
     contacts then do not creep. Missing the smaller tolerance is no failure.
     """
     enough, most = O.real.enough, O.count.most
-    rounding = VELOCITY_ROUNDING * largest_velocity(P, X, O)
-    O.real.enough = max(NEWTON_TOLERANCE_FACTOR * enough, min(enough, rounding))
+    O.real.enough, O.real.acceptable = NEWTON_TOLERANCE_FACTOR * enough, enough
     if O.count.most_steps > 0:
         O.count.most = O.count.most_steps
     call(F.doors[SMALL_ISLAND_SOLVER], P, X, W, O, f, 0)
-    O.real.enough, O.count.most = enough, most
+    O.real.enough, O.real.acceptable, O.count.most = enough, 0.0, most
     if (O.count.ended == LIMIT_REACHED or O.count.ended == STALLED) and O.real.residual <= enough:
         O.count.ended = CONVERGED
     if F.doors[OTHER_SOLVER] != 0 and (O.count.ended == STORAGE_TOO_SMALL or O.count.ended == SOLVE_FAILED):
