@@ -177,7 +177,7 @@ NOTICE_PREFIX = "compiling for this machine, once: "
 NUMBA_IMPORT_SECONDS = 0.25
 """Seconds to import Numba on the machine on which `COSTS` were measured."""
 COSTS: dict[str, tuple[str, float]] = {
-    "engine": ("the equations of motion", 22.0),
+    "engine": ("the equations of motion", 26.6),
     "residuals_kernel": ("the derivatives of the equations", 15.0),
     "radau_steps": ("the Radau method", 9.5),
     "alpha_steps": ("the generalised-alpha method", 6.0),
