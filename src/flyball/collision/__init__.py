@@ -8,5 +8,8 @@ touch, `narrow_phase` finds the contacts of a pair, `shapes` holds one file for 
 
 Imports NumPy, `math`, `compiler` and `errors` only (SciPy inside functions, for convex hulls). A new shape is a
 number in `shape_kinds` and a file in `shapes`; a pair with formulas of its own is a file in
-`narrow_phase/special_pairs`.
+`narrow_phase/special_pairs`. Two more places are optional: half edges of its bounding box in ``_HALF_EDGES`` of
+`contact_finder` (otherwise those of its bounding sphere: more pairs are examined), and its curvature at a contact in
+``_local_form`` of `statics.closed_contacts` (otherwise the stability of an equilibrium on it is not judged).
+Everything with contact is compiled again.
 """

@@ -31,7 +31,11 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One scalar term: the kind of its formula, its parameters, the constrained axes, its replacement for assembly."""
+    """One scalar term: the kind of its formula, its parameters, the constrained axes, its replacement for assembly.
+
+    ``par`` has eight numbers: six for the formula, one that is subtracted from the value, one that multiplies the row
+    (1). `Joint.constants` may replace the first seven for the drawn frames.
+    """
 
     kind: int
     par: tuple[float, ...]

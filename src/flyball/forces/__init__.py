@@ -1,4 +1,13 @@
-"""Force elements: one file each, found automatically. A new force is a new file here, and a line below for editors."""
+"""Force elements: one file each, found automatically. A new force is a new file here, and a line below for editors.
+
+``KIND`` is the next number. ``inputs`` and ``wrench`` (or ``effort``), ``energy`` and all functions that they call
+carry `formula`, otherwise nothing of the engine can be compiled; a class with ``wrench`` needs ``inputs`` of its own,
+since those of its base class are for elements outside the package. ``placed`` returns its frames if it is given by
+points: `TwoPointForce` has one, with the world's axes; `TwoFrameForce` has none (pattern: `bushing`). ``on_points``
+returns whether it may act on a point mass. ``fails`` ends the message about a force that is no number: it says the
+remedy. All compiled mechanics is compiled again. Samples in tests: ``contract/test_forces.py``, ``robust/forces.py``,
+and in the mechanisms with every force of ``contract/test_everything.py`` and ``identities/test_complex_values.py``.
+"""
 
 import importlib
 import pkgutil

@@ -1,10 +1,14 @@
 """Joints and couplings: one file each. A new one is a new file here and one line below.
 
 A joint is data: constraint rows (``blocks``, of `constraints.blocks`), relative coordinates (``coordinates``) and,
-where it can be a tree joint, what it leaves free as a ``chain`` of primitive joints, slides first; rows that the chain
-does not fulfil are ``kept``. Nothing is compiled for a new joint. ``world_frames`` places its frames where ``at`` and
-``axis`` are not enough, ``constants`` are numbers that rows compare with, ``drawn`` is its symbol in pictures.
-``replaceable``, ``stand_in`` and ``called`` offer it as a remedy for redundant constraints.
+where it can be a tree joint, what it leaves free as a ``chain`` of primitive joints, slides first; blocks that the
+chain does not fulfil are repeated in ``remaining_rows``, and ``rest`` has the axes of M in F at zero coordinates if
+they are not parallel. Nothing is compiled for a new joint. ``world_frames`` places its frames where ``at`` and ``axis``
+are not enough (pattern: `universal`), ``constants`` are numbers that rows compare with, ``symbol`` names its picture.
+``replaceable``, ``stand_in`` and ``called`` offer it as a remedy for redundant constraints. ``one_surface`` must be
+True where the coordinates are slips of one surface: friction along a second one is then refused; without it both act.
+`model.joint.Joint` says what every such attribute means. Samples in tests: ``contract/zoo.py``, ``robust/joints.py``;
+if its axes must be at right angles, also ``RIGHT_ANGLES`` of ``identities/test_complex_values.py``.
 
 A coupling derives from `Coupling`: ``coupled()`` names coordinates of other joints, ``factors()`` their weights.
 Imports `constraints`, `math` and `model` only. Coordinates are zero in the reference configuration, not where axes of

@@ -32,7 +32,8 @@ class Force(Element):
     and ``wrench(par, F, M, laws, values)`` with the values of the inputs: force and torque on M at M's origin, world
     axes; the reverse acts on F's body at the same point. The other acts along a measured quantity x: ``effort(par, x,
     rate, laws, load)``, positive towards larger x (`CoordinateForce`). Either may have an ``energy``. Formulas are
-    plain functions of numbers in the subclass's file; ``kind`` numbers them.
+    functions of numbers in the subclass's file, in the package with the decorator `compiler.formulas.formula`; ``kind``
+    numbers them.
     """
 
     category: ClassVar[str] = "forces"
