@@ -6,6 +6,7 @@ the coordinates, `simulate` runs the compiled loop, `events/` resolves events (i
 the result and its health report, and `diagnosis` explains why an integration failed.
 
 This package may import `model/`, `tables/`, `engine/`, `numerics/`, `collision/`, `codegen/`, `assembly/`,
-`mobility/` and `results/`. A new integrator is a tableau or a step method in `numerics/integrators/`, with its name
-in `method_choice`. A new kind of event guard is handled in `events/`.
+`mobility/` and `results/`. A new explicit integrator is an entry of `butcher_tableaux.TABLEAUX`, a new implicit one a
+step method in `numerics/integrators/` with its name in `method_choice`; the docstrings of `Mechanism.simulate` and
+`Mechanism.study` and ``docs/methods.md`` list the methods by hand. A new kind of event guard is handled in `events/`.
 """

@@ -160,7 +160,7 @@ class RunAnalysis:
 
 
 class TimedAnalysis(RunAnalysis):
-    """An analysis whose result has output times."""
+    """An analysis with output times. ``value`` and ``remarks`` read a `Result`; replace them if it returns another."""
 
     timed = True
 
