@@ -30,7 +30,7 @@ def test_dense_output_ends_at_the_step_and_follows_polynomials(name):
             assert weights @ R.c**k == pytest.approx(x ** (k + 1) / (k + 1), abs=1e-13)
 
 
-@pytest.mark.parametrize("name", TABLEAUX)
+@pytest.mark.parametrize("name", ["rk45", "dop853"])
 def test_numbers_are_those_of_scipy(name):
     integrate = pytest.importorskip("scipy.integrate")
     R, other = tableau(name), {"rk45": integrate.RK45, "dop853": integrate.DOP853}[name]
