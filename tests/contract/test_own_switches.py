@@ -11,7 +11,7 @@ import pytest
 
 import flyball as fb
 from flyball.constraints.switches.guard_kinds import G_HOLDS, OFF
-from flyball.constraints.switches.switch_kind import INTERVAL
+from flyball.constraints.switches.switch_kind import ANY_FORCE, INTERVAL
 from flyball.elements import Number, ProblemRow, Switch, SwitchKind, Unilateral, element
 from flyball.model.element import Element
 from flyball.numerics.complementarity.dense_problem import AT_REST, BILATERAL, FRICTION_LINE
@@ -68,8 +68,9 @@ class Catch(Unilateral):
 @pytest.fixture(autouse=True, scope="module")
 def forgotten():
     yield
-    Element.registry.pop("Catch", None)
-    Element.modules.pop("Catch", None)
+    for name in ("Catch", "Hook"):
+        Element.registry.pop(name, None)
+        Element.modules.pop(name, None)
 
 
 def run(coordinates, pull, **catch):
@@ -96,3 +97,45 @@ def test_fast_ones_pass():
     r = run("joint", "0", speed=0.4)
     assert not len(r.events)
     assert r["b"].velocity[-1, 0] == pytest.approx(-0.5)
+
+
+class HookKind(SwitchKind):
+    """A row that holds either way where its quantity is zero."""
+
+    @staticmethod
+    def guard(mode, way, x, rate, force, numbers, units):
+        return x if mode == 0.0 else math.nan
+
+    def velocity_rows(self, n, s, at, still):
+        return [ProblemRow(s, BILATERAL)] if n.mode[s] != OFF or abs(n.x[s]) <= n.near[s] else []
+
+    def acceleration_rows(self, n, s, at, still):
+        return self.velocity_rows(n, s, at, still) if still else []
+
+    def push_direction(self, x, bounds, near):
+        return 0.0 if abs(x) <= near else None
+
+
+HOOK = HookKind(guards=(G_HOLDS,), forces=ANY_FORCE, role="is held", closing=("hold", "holds"), states=("held", "free"))
+
+
+@element
+class Hook(Catch):
+    """A hook that holds a coordinate at zero either way."""
+
+    def switches(self):
+        return (Switch(HOOK, along=self.along(), weighted=True),)
+
+    def switched(self, n, label, separation):
+        return ()
+
+
+@pytest.mark.parametrize("pull", [2.0, -2.0, 0.0])
+def test_what_holds_either_way_is_not_about_to_open(pull):
+    m = fb.Mechanism("gate", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=0.1, position=(0.0, 0.0)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(0.0, 0.0), axis=(1.0, 0.0)))
+    m.add(fb.Actuator("pull", "P.displacement", force=pull), Hook("hook", "P.displacement"))
+    (touch,) = m.equilibrium().touching
+    assert touch.state == "smooth"
+    assert touch.normal == pytest.approx(abs(pull), abs=1e-12)

@@ -380,7 +380,11 @@ def touch_states(
     """State of every closed contact and of every other active constraint."""
     out = []
     lam = {name: float(found.lam[x.c.structure.slices[name]].sum()) for name in held.signs}
-    stops = {name: sign * lam[name] for name, sign in held.signs.items() if name not in bears}
+    stops = {
+        name: sign * lam[name] if sign else abs(lam[name])  # what holds either way cannot open
+        for name, sign in held.signs.items()
+        if name not in bears
+    }
     most = max([*found.force[:, 0].tolist(), 0.0])
     for c, f in zip(place.contacts, found.force, strict=True):
         slides = float(np.hypot(f[1], f[2]))
@@ -393,9 +397,8 @@ def touch_states(
         used = abs(lam[name]) / bound if bound > 0.0 else 0.0
         out.append(Touch(name, AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS, bound, abs(lam[name]), used))
     for name, effort in stops.items():
-        out.append(
-            Touch(name, ABOUT_TO_OPEN if effort <= NOTHING * max(map(abs, stops.values())) else FRICTIONLESS, effort)
-        )
+        opens = held.signs[name] and effort <= NOTHING * max(map(abs, stops.values()))
+        out.append(Touch(name, ABOUT_TO_OPEN if opens else FRICTIONLESS, effort))
     return tuple(out)
 
 
