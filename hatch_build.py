@@ -34,7 +34,7 @@ class ObjectsHook(BuildHookInterface):
         sys.path.insert(0, str(ROOT / "src"))
         from flyball.compiler.ahead_of_time import all_kernels, compile_all
         from flyball.compiler.object_code import baselines
-        from flyball.compiler.object_code import file_name
+        from flyball.compiler.object_files import file_name
 
         cpus = baselines() if wanted == "1" else tuple(wanted.split(","))
         folder = ROOT / "build" / "objects"  # what is there of the same sources is taken

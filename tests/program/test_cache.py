@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flyball.compiler import formulas, object_code
+from flyball.compiler import formulas, object_files
 from flyball.compiler.formulas import PACKAGE, sources_of
 from flyball.engine.entry_point import engine
 from flyball.engine.residual import residuals_kernel
@@ -66,15 +66,15 @@ def test_stamps_see_every_way_to_import(tmp_path, monkeypatch):
 
 def test_the_files_used_longest_ago_are_removed(tmp_path, monkeypatch):
     """Beyond so many bytes; whatever else is in the folder stays."""
-    monkeypatch.setattr(object_code, "MAX_FOLDER_BYTES", 250)
+    monkeypatch.setattr(object_files, "MAX_FOLDER_BYTES", 250)
     other = tmp_path / "mine.o"
     other.write_bytes(bytes(1000))
     files = [tmp_path / f"kernel-{k:024x}.o" for k in range(4)]
     for k, path in enumerate(files):
         path.write_bytes(bytes(100))
         os.utime(path, (k, k))
-    object_code.mark_used(files[1])
-    object_code.remove_oldest(tmp_path)
+    object_files.mark_used(files[1])
+    object_files.remove_oldest(tmp_path)
     assert sorted(tmp_path.iterdir()) == [files[1], files[3], other]
 
 
@@ -156,7 +156,7 @@ print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for 
 def test_compiled_code_is_kept_in_the_home_folder_by_default(tmp_path):
     """Without ``FLYBALL_CACHE`` it is in the user's cache folder."""
     without = {k: v for k, v in os.environ.items() if k not in ("FLYBALL_CACHE", "XDG_CACHE_HOME")}
-    code = "from flyball.compiler.object_code import cache_folder; print(cache_folder())"
+    code = "from flyball.compiler.object_files import cache_folder; print(cache_folder())"
     env = without | {"HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path)}
     found = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert Path(found.stdout.strip()).is_relative_to(tmp_path)

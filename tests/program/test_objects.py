@@ -14,17 +14,8 @@ import pytest
 from flyball.compiler.ahead_of_time import all_kernels, missing_kernels
 from flyball.compiler.formulas import FAILED
 from flyball.compiler.kernels import kernel
-from flyball.compiler.object_code import (
-    BASELINES,
-    SHIPPED,
-    baseline,
-    cache_folder,
-    compile_kernel,
-    file_name,
-    object_folders,
-    read_object,
-    target_triple,
-)
+from flyball.compiler.object_code import BASELINES, baseline, compile_kernel, target_triple
+from flyball.compiler.object_files import SHIPPED, cache_folder, file_name, object_folders, read_object
 from flyball.compiler.struct_layout import Float1
 from tests.program.copied import Copy
 
@@ -167,7 +158,7 @@ def test_code_of_other_sources_is_not_used(tmp_path):
     copy = Copy(tmp_path)
     script = """
 import numpy as np
-from flyball.compiler.object_code import SHIPPED, code_of, file_name, write_object
+from flyball.compiler.object_files import SHIPPED, code_of, file_name, write_object
 from flyball.compiler.object_code import baseline
 from flyball.compiler.object_code import compile_kernel
 from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel

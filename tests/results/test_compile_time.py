@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler import object_code
+from flyball.compiler.announcements import announce_compilation, compiled_since
 from flyball.compiler.kernels import kernel
-from flyball.compiler.object_code import announce_compilation, baseline, compiled_since
+from flyball.compiler.object_code import baseline, compile_kernel
 from flyball.compiler.struct_layout import Float1
 from flyball.view.report import report_html
 from tests.results.made_up import slider_crank
@@ -30,7 +30,7 @@ def test_compilations_are_counted():
         return p.x[0] + by
 
     begin = time.perf_counter()
-    object_code.compile_kernel(more, (baseline(),))  # whether or not there is a file of it
+    compile_kernel(more, (baseline(),))  # whether or not there is a file of it
     with announce_compilation(more):
         pass
     assert compiled_since(begin) < time.perf_counter() - begin

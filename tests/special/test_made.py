@@ -15,7 +15,7 @@ from flyball import codegen
 from flyball.codegen import store
 from flyball.codegen.procedures import ProcedureRecorder
 from flyball.compiler.kernels import StructBuffer
-from flyball.compiler.object_code import read_object
+from flyball.compiler.object_files import read_object
 from flyball.engine.calls import COMPLETE
 from flyball.engine.entry_point import allocate_work, run_task
 from flyball.engine.pulse_detection import INSPECTION_ROWS

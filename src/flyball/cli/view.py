@@ -61,7 +61,7 @@ def compile_kernels() -> None:
     """Compile, on all cores, everything that would be compiled on first use, and store it for this user."""
     with report_errors(False):
         from ..compiler.ahead_of_time import compile_all
-        from ..compiler.object_code import cache_folder
+        from ..compiler.object_files import cache_folder
 
         began = time.monotonic()
 

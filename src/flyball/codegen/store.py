@@ -1,6 +1,6 @@
 """Whether code can be generated for a mechanism, its key, its cost, and its cache in memory and on disk.
 
-Code is cached in this process, and on disk beside the engine's (`compiler.object_code`), for other processes.
+Code is cached in this process, and on disk beside the engine's (`compiler.object_files`), for other processes.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from ..compiler.formulas import GENERATED_SOURCES, PACKAGE, compiled_files
-from ..compiler.object_code import (
+from ..compiler.object_code import object_code_of_text
+from ..compiler.object_files import (
     HASH_DIGITS,
     cache_folder,
     mark_used,
-    object_code_of_text,
     read_object,
     remove_oldest,
     write_object,

@@ -13,18 +13,11 @@ from pathlib import Path
 from subprocess import PIPE
 from threading import Lock
 
+from .announcements import COSTS, DEFAULT_COST
 from .formulas import KERNELS, PACKAGE, compiled_files
 from .kernels import Kernel
-from .object_code import (
-    COSTS,
-    DEFAULT_COST,
-    baseline,
-    cache_folder,
-    compile_kernel,
-    file_name,
-    read_object,
-    write_object,
-)
+from .object_code import baseline, compile_kernel
+from .object_files import cache_folder, file_name, read_object, write_object
 
 _DECORATED = re.compile(r"^@(first_order_)?kernel$", re.MULTILINE)
 # Child processes find modules where this process does, and leave interrupts to it.

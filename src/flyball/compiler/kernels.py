@@ -113,7 +113,7 @@ class CompiledCode:
         if self._loaded is None:
             with LOCK:
                 if self._loaded is None:
-                    from .object_code import code_of
+                    from .object_files import code_of
 
                     self._loaded = code_of(self)
         return int(self._loaded.address)

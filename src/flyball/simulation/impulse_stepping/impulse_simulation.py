@@ -14,7 +14,7 @@ import numpy as np
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ...assembly.positions_and_velocities import described_velocities
-from ...compiler.object_code import compiled_since
+from ...compiler.announcements import compiled_since
 from ...errors import AnalysisError, SimulationError
 from ...math.vec import mtv, quaternion_matrix
 from ...mobility.mobility import mobility
