@@ -54,7 +54,7 @@ def right_hand_sides(S: System, W: Work, y: Float1, dy: Float1, n: int) -> int:
 def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[float, np.ndarray]:
     """Of a right-hand side, and what it is."""
     W, dy = allocate_work(s, S), np.zeros(len(y))
-    W.made[1:SAMPLED] = S.flat[1:SAMPLED]
+    W.generated[1:SAMPLED] = S.flat[1:SAMPLED]
     (
         W.options.stabilization,
         W.options.solve_tolerance,

@@ -46,7 +46,7 @@ def test_islands_one_by_one(limit, kind, seed):
     assert cone_lack(P, p, N @ p + b) < 1e-9 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
-    told, (count, I) = made.told, islands_of(P.at, P.line_at, P.size[1], P.size[2])
+    told, (count, I) = made.statistics, islands_of(P.at, P.line_at, P.size[1], P.size[2])
     contacts = np.diff(I.island[: count + 1])
     limit = -1 if len(P.turn) else limit  # rolling friction is for sweeps
     expected = 1, count, (contacts <= limit).sum(), (contacts > limit).sum()
@@ -74,7 +74,7 @@ def test_what_does_not_fit_is_handed_on():
     tight = made.F._replace(numbers=np.zeros(8), places=np.zeros(40, np.int64))
     made.kernel(P, X, W, O, tight, 0)
     p = impulses(P, X)
-    assert made.told[PASSED_ON] == 1 and O.count.ended == CONVERGED
+    assert made.statistics[PASSED_ON] == 1 and O.count.ended == CONVERGED
     assert cone_lack(P, p, N @ p + b) < 1e-8
 
 
@@ -83,7 +83,7 @@ def test_few_bodies_need_no_sweeps():
     made = prepare_solver("auto", P, X, W, O)
     assert made.F.doors[OTHER_SOLVER] == 0
     made.kernel(P, X, W, O, made.F, 0)
-    assert O.count.ended == CONVERGED and made.told[OTHER_SOLVED] == 0
+    assert O.count.ended == CONVERGED and made.statistics[OTHER_SOLVED] == 0
 
 
 def test_nothing_to_do():
@@ -109,7 +109,7 @@ def test_uneven_masses_go_to_newton_in_larger_islands(ratio, to_newton):
     O.count.most, O.real.enough = 100_000, 1e-9
     made = prepare_solver("auto", P, X, W, O)
     made.kernel(P, X, W, O, made.F, 0)
-    assert made.told[SMALL_SOLVED] == to_newton and made.told[OTHER_SOLVED] == 1 - to_newton
+    assert made.statistics[SMALL_SOLVED] == to_newton and made.told[OTHER_SOLVED] == 1 - to_newton
     assert O.count.ended == CONVERGED
     assert X.p[:, 0] == pytest.approx((1 / P.node[::-1, 0]).cumsum()[::-1], rel=1e-4)
     assert abs(X.v).max() < 1e-5

@@ -191,7 +191,7 @@ def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kin
         exact = (of_triangles(G, triangles, p, R) - s.rounding).min()
         at, x = np.repeat(G.shape, 2, axis=0), np.repeat(G.dimensions, 2, axis=0)
         at.kind[1], at.mover[1], at.first[1], x.par[1, :4], x.radius[1] = FIELD, 1, len(G.vertex), par, 4
-        both = Geometry(at, x, np.concatenate([G.vertex, rows]), G.face, G.apart)
+        both = Geometry(at, x, np.concatenate([G.vertex, rows]), G.face, G.excluded_pairs)
         pose = np.array([[*p, *R.ravel()], [0, 0, 0, *I.ravel()]])
         room = np.zeros((SCRATCH_ROWS, 8))
         count = meet(both, Movers(pose, np.zeros((2, 6))), 0, 1, 0.05, room)
@@ -212,7 +212,7 @@ def of_triangles(G, triangles, p, R):
     pose = np.tile([*p, *R.ravel()], (2 * m, 1))
     pose[1::2] = [0, 0, 0, *I.ravel()]
     vertex = np.concatenate([G.vertex, triangles.reshape(-1, 3)])
-    return separations(Geometry(at, x, vertex, G.face, G.apart), pose)[:, 0]
+    return separations(Geometry(at, x, vertex, G.face, G.excluded_pairs), pose)[:, 0]
 
 
 def test_beyond_its_border_there_is_no_ground():

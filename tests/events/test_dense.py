@@ -170,7 +170,7 @@ def painleve(mu: float, angle: float, spin: float) -> DenseProblem:
     A = np.array([[1 + 3 * c * c, -3 * c * s], [-3 * c * s, 1 + 3 * s * s]])
     P = problem(A, [spin**2 * s - 1.0, spin**2 * c], [UNILATERAL, SLIDING])
     P.gain[1, 0] = mu
-    P.lean[1] = -1.0  # the end slides to the left when seen along the row
+    P.bound_sign[1] = -1.0  # the end slides to the left when seen along the row
     return P
 
 
@@ -179,7 +179,7 @@ def test_painleves_rod():
     a = 1.1
     mu = 1.5 * (1 + 3 * np.cos(a) ** 2) / (3 * np.sin(a) * np.cos(a))
     P = painleve(0.3, a, 0.0)
-    P.lean[1] = 1.0
+    P.bound_sign[1] = 1.0
     assert solve_dense_problem(P) == SOLUTION_FOUND
     c, s = np.cos(a), np.sin(a)
     np.testing.assert_allclose(P.x[0], 1.0 / (1 + 3 * c * c + 0.3 * 3 * s * c), rtol=1e-12)

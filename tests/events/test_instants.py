@@ -129,12 +129,14 @@ def test_corners_of_laws_cost_their_own_steps_only():
 
 def test_health_says_that_a_guard_is_no_proof():
     run = ball(note("S.displacement + 1")).simulate(0.2)
-    assert "1 event function evaluated at" in run.health.watched
-    average, least = map(int, re.search(r"about (\d+) points per step \(at least (\d+)\)", run.health.watched).groups())
+    assert "1 event function evaluated at" in run.health.event_detection
+    average, least = map(
+        int, re.search(r"about (\d+) points per step \(at least (\d+)\)", run.health.event_detection).groups()
+    )
     assert average >= least
-    assert "can be missed" in run.health.watched
-    assert ("watched", run.health.watched) in run.health.lines()
-    assert ball().simulate(0.2).health.watched == ""
+    assert "can be missed" in run.health.event_detection
+    assert ("event detection", run.health.event_detection) in run.health.lines()
+    assert ball().simulate(0.2).health.event_detection == ""
 
 
 def test_an_interrupt_keeps_what_there_is():

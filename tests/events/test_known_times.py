@@ -50,13 +50,13 @@ def test_a_law_of_time_and_state():
     m.add(fb.Actuator("spring", "track.displacement", force="-1e6*(value - 0.5)*exp(-((t - 4.321)/1e-6)**2)"))
     r = m.simulate(10.0, outputs=2, rtol=1e-10)
     assert r["cart"].velocity[-1, 0] == pytest.approx(0.5e6 * 1e-6 * np.sqrt(np.pi) / 2, rel=1e-6)
-    assert "sampled" not in r.health.watched
+    assert "sampled" not in r.health.event_detection
 
 
 def test_what_follows_the_state_is_told():
     m = cart("1")
     m.add(fb.Actuator("wall", "track.displacement", force="-exp(-(value/0.01)**2)"))
-    assert "force of Actuator 'wall'" in m.simulate(1.0, outputs=2).health.watched
+    assert "force of Actuator 'wall'" in m.simulate(1.0, outputs=2).health.event_detection
 
 
 @pytest.mark.parametrize("specialize", [True, False])

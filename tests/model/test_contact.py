@@ -27,7 +27,7 @@ def meet(t: ContactTables, a: int, b: int) -> bool:
     i, j = t.geometry.shape[a], t.geometry.shape[b]
     if i.mover == j.mover or not (i.member & j.mask and j.member & i.mask):
         return False
-    return sorted((i.mover, j.mover)) not in t.geometry.apart.tolist()
+    return sorted((i.mover, j.mover)) not in t.geometry.excluded_pairs.tolist()
 
 
 def pairs(t: ContactTables) -> set[tuple[str, str]]:

@@ -132,7 +132,7 @@ def values(document, at):
         ready = [f for f in defined if all(x.data.name in known or not x.moving for x in symbols_of([f.right]))]
         assert ready, "abbreviations that stand for one another"
         for f in ready:
-            known[f.left.plain] = evaluate([f.right], known)[0]
+            known[f.left.text] = evaluate([f.right], known)[0]
         defined = [f for f in defined if f not in ready]
     return known
 
@@ -151,18 +151,18 @@ def test_the_document_tells_what_the_engine_computes_with(equations):
     for section in document.sections:
         for block in section.blocks:
             if isinstance(block, Matrix):
-                letter = block.left.plain
+                letter = block.left.text
                 made = np.array(evaluate(block.entries.ravel().tolist(), known), float).reshape(block.entries.shape)
                 np.testing.assert_allclose(made, getattr(eq, letter).at(raw), rtol=1e-10, atol=1e-10)
             elif isinstance(block, Formulas) and section.name == "constraints":
                 for f in block.formulas:
-                    letter, k = re.fullmatch(r"(\w+)\[(\d+)\]", f.left.plain).groups()
+                    letter, k = re.fullmatch(r"(\w+)\[(\d+)\]", f.left.text).groups()
                     exact = getattr(eq, letter).at(raw)[int(k) - 1]
                     assert evaluate([f.right], known)[0] == pytest.approx(exact, rel=1e-10, abs=1e-10)
     total = np.zeros(len(eq.v))
     for block in next(s for s in document.sections if s.name == "forces").blocks:
         for f in getattr(block, "formulas", ()):
-            total[int(re.match(r"f\[(\d+)\]", f.left.plain)[1]) - 1] += evaluate([f.right], known)[0]
+            total[int(re.match(r"f\[(\d+)\]", f.left.text)[1]) - 1] += evaluate([f.right], known)[0]
     np.testing.assert_allclose(total, eq.f.at(raw), rtol=1e-10, atol=1e-9)
     rows = [f for s in document.sections if s.name == "motion" for b in s.blocks for f in getattr(b, "formulas", ())]
     residual = eq.residual.at(raw)

@@ -43,7 +43,7 @@ class GivenVelocity:
     turns: int  # number of angular velocities
     origin: bool  # whether the velocity of its reference frame's origin is given
     turning: bool  # whether its angular velocity is given
-    as_drawn: bool
+    from_reference: bool
 
     @property
     def whole(self) -> bool:
@@ -471,10 +471,10 @@ class VelocityEquations:
         small = c.structure.nv <= DENSE_VELOCITIES
         free = np.ones(c.structure.nv)
         for g in told:
-            if g.as_drawn and g.whole:
+            if g.from_reference and g.whole:
                 free[g.at : g.at + g.n] = 0.0
-        held = [g for g in told if g.as_drawn and not g.whole]
-        soft = [g for g in told if not g.as_drawn]
+        held = [g for g in told if g.from_reference and not g.whole]
+        soft = [g for g in told if not g.from_reference]
         G = c.jacobian() if small else c.sparse_jacobian()
         if held:
             G = _stacked_rows(G, _deviation_rows(c, q, held, {}))

@@ -64,12 +64,12 @@ RANGE_SEPARATOR = ":"  # in "0:10:21": 21 values from 0 to 10
 class OptionOverride:
     """Properties of an option that its type does not determine.
 
-    ``default`` is the default of the command, ``shown`` its description in the help; ``names`` are the names of the
+    ``default`` is the default of the command, ``default_text`` its description in the help; ``names`` are those of the
     option, ``many`` allows the option to be repeated, ``read`` converts the text to the method's value.
     """
 
     default: Any = None
-    shown: str | None = None
+    default_text: str | None = None
     names: tuple[str, ...] = ()
     help: str | None = None
     type: Any = None
@@ -212,8 +212,8 @@ def make_option(p: inspect.Parameter, described: ArgumentHelp, override: OptionO
 def _option_help(p: inspect.Parameter, described: ArgumentHelp, override: OptionOverride, hint: str) -> str:
     """Return the help of an option: description, format, choices and default."""
     usual = (
-        override.shown
-        if override.shown is not None
+        override.default_text
+        if override.default_text is not None
         else override.default
         if override.default is not None
         else p.default

@@ -137,7 +137,10 @@ def compare(request: Request, *, plot: PlotFile = None) -> None:
 
 
 DEFAULT_END = "1"  # end of the motion [s] if nothing specifies it
-TIME_OPTIONS = {"times": OptionOverride(names=("--outputs", "--times")), "t_end": OptionOverride(shown=DEFAULT_END)}
+TIME_OPTIONS = {
+    "times": OptionOverride(names=("--outputs", "--times")),
+    "t_end": OptionOverride(default_text=DEFAULT_END),
+}
 
 
 @command(MotionMethods.kinematics, overrides=TIME_OPTIONS)

@@ -185,11 +185,11 @@ def search_workspace(G: Geometry, pairs: int, contacts: int) -> Search:
         level_grid=LevelGrid.blank(len(meets) * SIZE_LEVELS),
         sums=SizeGroups.blank(len(meets) * SIZE_LEVELS),
         pair=SlotPairs.blank(pairs),
-        seen=np.full((2, pairs), -1, np.int32),
+        first_contacts=np.full((2, pairs), -1, np.int32),
         mark=np.zeros(ns, np.int64),
         moved=np.zeros(ns, np.int64),
-        room=np.zeros((SCRATCH_ROWS, 8)),
-        kept=np.zeros((2, 12)),
+        narrow_phase_contacts=np.zeros((SCRATCH_ROWS, 8)),
+        stored_pose=np.zeros((2, 12)),
         table=_pair_hash_table(contacts),
     )
 
@@ -238,7 +238,7 @@ class ContactFinder:
         self.now, self.before, self.midway = (no_contacts(4 * ns + 64) for _ in range(3))
         self.search = search_workspace(geometry, 8 * ns + 64, 4 * ns + 64)
         real = self.search.real
-        real.margin, real.skin, real.ahead = margin, skin, ahead
+        real.margin, real.skin, real.horizon = margin, skin, ahead
         self.search.count.narrow_phase = narrow_phase_kernel(geometry).address
         self.address = search.address
 
@@ -308,9 +308,9 @@ class ContactFinder:
                 "that may go through each other"
             )
         larger = min(2 * capacity, most)
-        pair, seen = SlotPairs.blank(larger), np.full((2, larger), -1, np.int32)
-        pair[:capacity], seen[:, :capacity] = B.pair, B.seen
-        self.search = B._replace(pair=pair, seen=seen)
+        pair, first_contacts = SlotPairs.blank(larger), np.full((2, larger), -1, np.int32)
+        pair[:capacity], first_contacts[:, :capacity] = B.pair, B.first_contacts
+        self.search = B._replace(pair=pair, first_contacts=first_contacts)
 
     def most_pairs(self) -> tuple[int, int]:
         """Shape with the most pairs in the list, and their number."""

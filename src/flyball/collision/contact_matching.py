@@ -34,7 +34,7 @@ def store_pair(B, i, j, first):
     k = table_place(B.table.names, i, j, name)
     if B.table.names[k] == EMPTY_PLACE:
         B.table.names[k], B.table.firsts[k] = name, first
-        B.table.taken[B.count.table_pairs] = k
+        B.table.occupied[B.count.table_pairs] = k
         B.count.table_pairs += 1
 
 
@@ -52,7 +52,7 @@ def stored_contact(B, i, j):
 def clear_table(B):
     """Empty the table."""
     for k in range(B.count.table_pairs):
-        B.table.names[B.table.taken[k]] = EMPTY_PLACE
+        B.table.names[B.table.occupied[k]] = EMPTY_PLACE
     B.count.table_pairs = 0
 
 

@@ -59,7 +59,7 @@ def write_contact(C, n, point, normal, gap, offset):
         C.x.point[n, 0], C.x.point[n, 1], C.x.point[n, 2] = point
         C.x.normal[n, 0], C.x.normal[n, 1], C.x.normal[n, 2] = normal
         C.x.gap[n] = gap
-        C.x.apart[n, 0], C.x.apart[n, 1], C.x.apart[n, 2] = offset
+        C.x.half_separation[n, 0], C.x.half_separation[n, 1], C.x.half_separation[n, 2] = offset
 
 
 @formula
@@ -106,13 +106,13 @@ def sphere_sphere_contact(C, B, s, t, n):
         D = (B.frame.velocity[0], B.frame.velocity[1], B.frame.velocity[2])
         v, w = sub(load3(now.velocity, s, 0), D), sub(load3(now.velocity, t, 0), D)
         u = sub(w, v)
-        time = approach_time((x, y, z), r, reach, u, B.real.ahead)
+        time = approach_time((x, y, z), r, reach, u, B.real.horizon)
         if time < 0.0:
             u = w
-            time = approach_time((x, y, z), r, reach, u, B.real.ahead)
+            time = approach_time((x, y, z), r, reach, u, B.real.horizon)
         if time < 0.0:
             u = scale(-1.0, v)
-            time = approach_time((x, y, z), r, reach, u, B.real.ahead)
+            time = approach_time((x, y, z), r, reach, u, B.real.horizon)
         if time < 0.0:
             return 0
         a, b, c = x + time * u[0], y + time * u[1], z + time * u[2]
@@ -158,7 +158,7 @@ def plane_sphere_contact(C, B, w, s, side, n):
         closing = a * (q.velocity[k, 0] + u[1] * x[2] - u[2] * x[1] - B.now.velocity[s, 0])
         closing += b * (q.velocity[k, 1] + u[2] * x[0] - u[0] * x[2] - B.now.velocity[s, 1])
         closing += c * (q.velocity[k, 2] + u[0] * x[1] - u[1] * x[0] - B.now.velocity[s, 2])
-        if gap >= B.real.margin + closing * B.real.ahead:
+        if gap >= B.real.margin + closing * B.real.horizon:
             return 0
     p = B.now.radius[s] + 0.5 * gap
     point = (B.now.centre[s, 0] - p * a, B.now.centre[s, 1] - p * b, B.now.centre[s, 2] - p * c)
@@ -175,7 +175,7 @@ def store_pose(M, B, row, m):
     """Store the pose of a mover."""
     if m >= 0:
         for c in range(12):
-            B.kept[row, c] = M.pose[m, c]
+            B.stored_pose[row, c] = M.pose[m, c]
 
 
 @formula
@@ -183,7 +183,7 @@ def restore_pose(M, B, row, m):
     """Restore the stored pose of a mover."""
     if m >= 0:
         for c in range(12):
-            M.pose[m, c] = B.kept[row, c]
+            M.pose[m, c] = B.stored_pose[row, c]
 
 
 @formula
@@ -192,10 +192,10 @@ def advance_pose(M, B, row, m, time):
     if m >= 0:
         w = load3(M.twist, m, 3)
         half = 0.5 * time * norm(w)
-        store3(M.pose, m, 0, add(load3(B.kept, row, 0), scale(time, load3(M.twist, m, 0))))
+        store3(M.pose, m, 0, add(load3(B.stored_pose, row, 0), scale(time, load3(M.twist, m, 0))))
         if half > 0.0:
             e = scale(0.5 * time * sin(half) / half, w)
-            store9(M.pose, m, 3, mm(quaternion_matrix(cos(half), e[0], e[1], e[2]), load9(B.kept, row, 3)))
+            store9(M.pose, m, 3, mm(quaternion_matrix(cos(half), e[0], e[1], e[2]), load9(B.stored_pose, row, 3)))
 
 
 @formula
@@ -214,7 +214,7 @@ def smallest_gap(B, found):
     """Index of the contact with the smallest gap."""
     best = 0
     for k in range(found):
-        if B.room[k, 6] < B.room[best, 6]:
+        if B.narrow_phase_contacts[k, 6] < B.narrow_phase_contacts[best, 6]:
             best = k
     return best
 
@@ -224,7 +224,7 @@ def closing_speed(B, s, t, k):
     """Largest speed at which two bounded shapes can approach along the normal of contact k."""
     v = B.now.turning_speed[s] + B.now.turning_speed[t]
     for c in range(3):
-        v += B.room[k, 3 + c] * (B.now.velocity[s, c] - B.now.velocity[t, c])
+        v += B.narrow_phase_contacts[k, 3 + c] * (B.now.velocity[s, c] - B.now.velocity[t, c])
     return v
 
 
@@ -236,7 +236,7 @@ def advance_to_touch(G, M, B, s, t, reach, size):
     largest displacement.
     """
     a, b = B.slot.mover[s], B.slot.mover[t]
-    ahead, time = B.real.ahead, 0.0
+    ahead, time = B.real.horizon, 0.0
     fastest = (reach - B.real.margin) / ahead
     enough = B.real.margin + TOUCHING_GAP * size
     for _ in range(MAX_ADVANCES):
@@ -244,7 +244,7 @@ def advance_to_touch(G, M, B, s, t, reach, size):
         if found == 0:
             return 0, time
         k = smallest_gap(B, found)
-        gap = B.room[k, 6]
+        gap = B.narrow_phase_contacts[k, 6]
         if gap <= enough:
             return found, time
         speed = fastest
@@ -275,7 +275,7 @@ def frame_velocity(B):
 def largest_approach(B, s, t):
     """Largest decrease of the distance of two bounded slots in ``ahead`` seconds."""
     u = norm(sub(load3(B.now.velocity, t, 0), load3(B.now.velocity, s, 0)))
-    return B.real.ahead * (u + B.now.turning_speed[s] + B.now.turning_speed[t])
+    return B.real.horizon * (u + B.now.turning_speed[s] + B.now.turning_speed[t])
 
 
 @formula
@@ -287,7 +287,7 @@ def pair_reach(B, s, t):
     v, w = sub(load3(now.velocity, s, 0), D), sub(load3(now.velocity, t, 0), D)
     u = max(norm(sub(w, v)), norm(v), norm(w))
     d = sub(load3(now.centre, t, 0), load3(now.centre, s, 0))
-    reach += B.real.ahead * (u + now.turning_speed[s] + now.turning_speed[t])
+    reach += B.real.horizon * (u + now.turning_speed[s] + now.turning_speed[t])
     whole = reach + now.radius[s] + now.radius[t]
     return reach if dot(d, d) < whole * whole and bounds_meet(B, B.axes, s, t, d, reach) else -1.0
 
@@ -300,7 +300,7 @@ def plane_reach(M, B, w, s):
     p, n = load3(B.now.centre, s, 0), load3(q.normal, k, 0)
     u = norm(sub(velocity_at_point(M, B.slot.mover[w], p), load3(B.now.velocity, s, 0)))
     gap = dot(n, sub(p, load3(q.origin, k, 0))) - half_extent(B, B.axes, s, n)
-    reach = B.real.margin + B.real.ahead * (u + B.now.turning_speed[s] + norm(load3(q.spin, k, 0)) * B.now.radius[s])
+    reach = B.real.margin + B.real.horizon * (u + B.now.turning_speed[s] + norm(load3(q.spin, k, 0)) * B.now.radius[s])
     return -1.0 if gap > reach else reach
 
 
@@ -323,21 +323,21 @@ def accept_contacts(M, C, O, B, pair, rows, time, found):
 
     ``rows``: the pair's first contact in the last search and the next row of C. Returns their number.
     """
-    many, used, ahead = 0, 0, B.real.ahead
+    many, used, ahead = 0, 0, B.real.horizon
     s, t = pair
     i, j = B.slot.shape_index[s], B.slot.shape_index[t]
     size = min(B.now.radius[s], B.now.radius[t])
     for k in range(found):
-        p, e = load3(B.room, k, 0), load3(B.room, k, 3)
+        p, e = load3(B.narrow_phase_contacts, k, 0), load3(B.narrow_phase_contacts, k, 3)
         v, u = velocity_at_point(M, B.slot.mover[s], p), velocity_at_point(M, B.slot.mover[t], p)
         closing = dot(e, sub(v, u))
-        gap = B.room[k, 6] + time * closing
+        gap = B.narrow_phase_contacts[k, 6] + time * closing
         D = frame_velocity(B)
         if s < B.count.bounded and t < B.count.bounded:  # another contact may stop one of them
             closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
         if gap < B.real.margin + ahead * max(0.0, closing):
             p, apart = point_before_motion(M, p, B.slot.mover[s], B.slot.mover[t], time)
-            feature = int(B.room[k, 7])
+            feature = int(B.narrow_phase_contacts[k, 7])
             c, bit = matching_contact(O, (i, j), rows[0], feature, sub(p, scale(ahead, v)), size, used)
             used |= bit
             write_contact(C, rows[1] + many, p, e, gap, apart)
@@ -377,7 +377,7 @@ def contacts_of_pairs(G, M, C, O, B):
     n, half = 0, B.count.current_half
     for k in range(B.count.pairs):
         s, t, way = B.pair.first[k] + 0, B.pair.second[k] + 0, B.pair.kind[k]  # + 0: all integers of one type
-        first = B.seen[half, k] + 0
+        first = B.first_contacts[half, k] + 0
         if way == GENERIC_PAIR:
             found = generic_contacts(G, M, C, O, B, (s, t), first, n)
         else:
@@ -389,7 +389,7 @@ def contacts_of_pairs(G, M, C, O, B):
                 found = plane_sphere_contact(C, B, s, t, 1.0, n)
             if found != 0:
                 write_contact_identity(C, n, B.slot.shape_index[s], B.slot.shape_index[t], 0, first)
-        B.seen[1 - half, k] = n if found > 0 else -1
+        B.first_contacts[1 - half, k] = n if found > 0 else -1
         n += found
     return n
 
@@ -470,12 +470,12 @@ def update_list(G, M, O, B, task):
 @formula
 def midway_contacts(G, M, C, O, B):
     """Find contacts of the listed pairs at these poses; the data of the last search are unchanged."""
-    ahead = B.real.ahead
-    B.real.ahead = 0.0
+    ahead = B.real.horizon
+    B.real.horizon = 0.0
     _, way = update_slots(G, M, B)
     add_displacement(B, way)
     n = contacts_of_pairs(G, M, C, O, B)
-    B.real.ahead = ahead
+    B.real.horizon = ahead
     C.count.found = n
     return DONE if n <= C.x.shape[0] else FULL_CONTACTS
 

@@ -46,7 +46,7 @@ class Geometry(NamedTuple):
     dimensions: Dimensions
     vertex: Float2  # (nv, 3): of hulls, polygons and height fields, in the shape's axes
     face: Int1  # (nf,): faces of hulls: number of corners, then corners counter-clockwise seen from outside, ...
-    apart: Int2  # (nx, 2): pairs of movers (smaller first; -1: fixed) that never touch, sorted
+    excluded_pairs: Int2  # (nx, 2): pairs of movers (smaller first; -1: fixed) that never touch, sorted
     code: CodeTables1 = np.zeros(0, np.int64)  # (ns,): code table of user-defined shapes; 0 for others
 
 
@@ -82,7 +82,7 @@ class ContactPoints(Record, kind="Float", rows=True):
     point: Vector3  # midway between the surfaces [m]
     normal: Vector3  # unit normal from 1 to 2
     gap: Column  # [m] (< 0: overlap)
-    apart: Vector3  # half the distance of that point on the two shapes until they touch (subtracted on 1)
+    half_separation: Vector3  # half the distance of that point on the two shapes until they touch (subtracted on 1)
 
 
 class Contacts(NamedTuple):

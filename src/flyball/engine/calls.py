@@ -141,9 +141,9 @@ def select_generated_code(S, W, task):
     wanted = task == INTEGRATE or task == COMPLETE or task == FOLLOW
     if W.options.stabilization == PARTITIONING:
         wanted = False
-    W.made[SCRATCH] = 0
+    W.generated[SCRATCH] = 0
     for k in range(SCRATCH + 1, FLAT):
-        W.made[k] = S.flat[k] if wanted else 0
+        W.generated[k] = S.flat[k] if wanted else 0
 
 
 @when_compiling

@@ -221,7 +221,7 @@ def perform_task(S, W, R, clock, out, task):
         project_error(y, clock.K[0], S, W)
         return 0
     if task == INSPECT:
-        at = inspect_step(t, clock.real.h, clock.real.span, clock.count.next, clock.seen, S, W)
+        at = inspect_step(t, clock.real.h, clock.real.span, clock.count.next, clock.inspection, S, W)
         clock.count.next, clock.real.h, clock.real.max_growth = at
         return 0
     if task == SLOPES:

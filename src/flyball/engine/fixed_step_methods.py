@@ -44,14 +44,14 @@ class AlphaWorkspace(NamedTuple):
     pushed: ResidualBatch
     pressed: ResidualBatch
     plan: JacobianPlan
-    desk: AlphaStepWorkspace
+    step: AlphaStepWorkspace
 
 
 class AlphaArguments(NamedTuple):
     """Arguments of the generalised-alpha method; the counterpart of `ImplicitArguments`."""
 
     SC: ComplexSystem
-    own: AlphaWorkspace
+    workspace: AlphaWorkspace
 
 
 SMALL_HALF_TURN = 1e-3  # half rotation angle [rad] below which the series of arctan(x) / x is used

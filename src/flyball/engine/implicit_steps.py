@@ -64,7 +64,7 @@ class JacobianPlan(NamedTuple):
     fixed: Int1  # (1,): whether the mass matrix is constant
     negative: Int1  # entries whose negatives follow all others and a -1
     light: Float1  # (nv,): inertia added to the Jacobian for bodies without inertia, else 0
-    own_mass: Int1  # (nv,): entries of the diagonal inertia of each velocity
+    inertia_entry: Int1  # (nv,): entries of the diagonal inertia of each velocity
 
 
 class ImplicitWorkspace(NamedTuple):
@@ -75,14 +75,14 @@ class ImplicitWorkspace(NamedTuple):
     pushed: ResidualBatch  # with steps of accelerations
     pressed: ResidualBatch  # without steps
     plan: JacobianPlan
-    desk: RadauStepWorkspace  # workspace of the method
+    step: RadauStepWorkspace  # workspace of the method
 
 
 class ImplicitArguments(NamedTuple):
     """Arguments of an implicit method's steps."""
 
     SC: ComplexSystem
-    own: ImplicitWorkspace
+    workspace: ImplicitWorkspace
 
 
 @formula
@@ -204,7 +204,7 @@ def stage_jacobian(t, k, A, K, c):
         set_batch_state(own.y[0], k, A, A[ACCELERATION_BATCH], K)
         status += complex_step_entries(A, A[ACCELERATION_BATCH], INERTIAL_TERMS, P.mass, K.J[k, first:last])
         for i in range(P.light.shape[0]):
-            K.J[k, P.own_mass[i]] += P.light[i]
+            K.J[k, P.inertia_entry[i]] += P.light[i]
     elif k != STEP_START:
         for e in range(first, last):
             K.J[k, e] = K.J[STEP_START, e]
@@ -337,12 +337,12 @@ def perform_implicit(method, callbacks, S, W, M, engine_arguments, run_state, ta
     """Run a task of an implicit method."""
     A = (
         engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output,
-        run_state.group, engine_arguments.doors[1], M.SC, M.own.WC, M.own.moved, M.own.pushed, M.own.pressed,
-        M.own.plan, run_state, method[1],
+        run_state.group, engine_arguments.doors[1], M.SC, M.workspace.WC, M.workspace.moved, M.workspace.pushed,
+        M.workspace.pressed, M.workspace.plan, run_state, method[1],
     )  # fmt: skip
     if task == BEGIN_SEGMENT:
         copy_modes(A)
-    return run_implicit_task(method, callbacks, A, M.own.desk, run_state.clock, task)
+    return run_implicit_task(method, callbacks, A, M.workspace.step, run_state.clock, task)
 
 
 @formula

@@ -268,7 +268,7 @@ def store_guard_inputs(A, K, row):
         K.g[grain, last] = GROUP_ROUNDING * A[GROUP].size[0]
     for i in range(K.grain.shape[0]):
         K.g[grain, i] = max(K.g[grain, i], K.least[i])
-        K.grain[i] = K.g[grain, i] if K.kept[i] == 1 else min(K.g[START_ROUNDING, i], K.g[grain, i])
+        K.grain[i] = K.g[grain, i] if K.nonnegative[i] == 1 else min(K.g[START_ROUNDING, i], K.g[grain, i])
 
 
 @formula
@@ -432,22 +432,22 @@ class GuardedLoop:
             self.expected = W._replace(
                 sensed=W.sensed.copy(), rows=W.rows._replace(multiplier=W.rows.multiplier.copy())
             )
-            self.desk = _event_workspace(S, self.expected, steps.c, steps.stages)
+            self.guard_state = _event_workspace(S, self.expected, steps.c, steps.stages)
         else:  # neither read nor written
             self.expected = W
             idle = idle_event_workspace(steps.c.tobytes(), steps.stages)
-            self.desk = idle.fields
+            self.guard_state = idle.fields
             self._known.append(idle)
         ny = clock.y.shape[1]
         own = StepState(
             clock.real.copy(), clock.count.copy(), clock.times, StateVectors.blank(ny), np.zeros((1, ny)),
-            clock.integrals, clock.seen,
+            clock.integrals, clock.inspection,
         )  # fmt: skip
         self.group, nv = group, W.velocities.solved.shape[0]
         sheet = OutputBuffer(np.zeros((4, max(width, len(S.guards.kind), nv, len(S.rows.law), 1))))
-        self.own = EngineArguments(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
+        self.arguments = EngineArguments(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: BoundKernel | None = None
-        self._clock, self._watch, self._group = (StructBuffer(x) for x in (clock, self.desk, group))
+        self._clock, self._watch, self._group = (StructBuffer(x) for x in (clock, self.guard_state, group))
         self._expected = StructBuffer(self.expected)
         self._own = [self._known[0], StructBuffer(own), StructBuffer(sheet)]
 
@@ -456,10 +456,12 @@ class GuardedLoop:
 
         Returns the number of rows written. Without event detection, controllers in ``sampling`` are sampled on the way.
         """
-        x = self.own
+        x = self.arguments
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address
-            own, going = (StructBuffer(f, *self._known) for f in (x, RunState(self.clock, self.desk, self.group)))
+            own, going = (
+                StructBuffer(f, *self._known) for f in (x, RunState(self.clock, self.guard_state, self.group))
+            )
             written = struct_tables(self.s, S)
             self.S, self._bound = S, self.steps.bind(written, self.scratch, own, going, x.doors)
             method = ArrayBuffer(self._bound.words, Array("i8", 1), "method")
@@ -475,7 +477,7 @@ class GuardedLoop:
     @property
     def fired(self) -> tuple[int, ...]:
         """Guards whose events ended the last step."""
-        return tuple(np.flatnonzero(self.desk.fired).tolist())
+        return tuple(np.flatnonzero(self.guard_state.fired).tolist())
 
 
 MAX_LOOP_LAYOUTS = 4  # layouts that are cached for each structure
@@ -484,7 +486,7 @@ MAX_LOOP_LAYOUTS = 4  # layouts that are cached for each structure
 class LoopOutput(NamedTuple):
     """Method (`BoundKernel.words`) and rows of output."""
 
-    asked: Int1
+    method: Int1
     rows: Float2
 
 
@@ -492,7 +494,7 @@ class LoopOutput(NamedTuple):
 def integrate_smooth(S, W, engine_arguments, run_state, out):
     """Continue an integration. Returns the number of rows written."""
     A = (engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output)
-    callbacks = (call_step_method, out.asked, engine_report, no_segment_start, finish_step)
+    callbacks = (call_step_method, out.method, engine_report, no_segment_start, finish_step)
     return advance(callbacks, A, run_state.watch, engine_arguments.R, run_state.clock, out.rows)
 
 
@@ -545,22 +547,22 @@ class SmoothLoop:
     ) -> None:
         self.steps, self.clock, self.s, self.scratch = steps, clock, s, scratch
         ny, width, R = clock.y.shape[1], max(width, s.nv, len(s.rows), 1), idle_tableau()
-        if clock.seen.shape[1]:
-            own = _engine_arguments(ny, width, clock.seen)
-            self.own, doors = StructBuffer(own, R), own.doors
+        if clock.inspection.shape[1]:
+            own = _engine_arguments(ny, width, clock.inspection)
+            self.arguments, doors = StructBuffer(own, R), own.doors
         else:
             mould = s.cache.get(
                 "own desk",
                 (ny, width),
                 MAX_LOOP_LAYOUTS,
-                lambda: StructPool(_engine_arguments(ny, width, clock.seen), R.fields),
+                lambda: StructPool(_engine_arguments(ny, width, clock.inspection), R.fields),
             )
-            self.own, doors = (made := mould.new()), made.array("doors")
+            self.arguments, doors = (made := mould.new()), made.array("doors")
         watch = idle_event_workspace(steps.c.tobytes(), steps.stages)
         self.going = JoinedBuffer(RunState, StructBuffer(clock), watch, _no_group())
         written = struct_tables(s, S)
         doors[0] = engine.address
-        self.bound = steps.bind(written, scratch, self.own, self.going, doors)
+        self.bound = steps.bind(written, scratch, self.arguments, self.going, doors)
         self._loop: tuple[np.ndarray, BoundKernel] | None = None
 
     def go_on(self, out: np.ndarray) -> int:
@@ -569,6 +571,6 @@ class SmoothLoop:
             rows = StructBuffer(LoopOutput(self.bound.words, out))
             self._loop = (
                 out,
-                BoundKernel(smooth_loop_kernel, self.bound.buffers[0], self.scratch, self.own, self.going, rows),
+                BoundKernel(smooth_loop_kernel, self.bound.buffers[0], self.scratch, self.arguments, self.going, rows),
             )
         return self._loop[1](0)

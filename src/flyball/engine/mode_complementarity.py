@@ -68,7 +68,7 @@ class ModeProblem(NamedTuple):
     loaded: Float1  # (nr,): multipliers with everything off, or of the impulses before
     asks: Int1  # (2,)
     step: Float1  # (1,): the time step
-    seen: Float1  # (n,): impulses of the previous iteration
+    previous: Float1  # (n,): impulses of the previous iteration
     now: Float1  # (n,): friction limits at them
 
 
@@ -235,7 +235,7 @@ def solve_mode_problem(S, W, t, B, P):
         B.asks[TRIES] += 1
         follows = update_friction_reaches(S, W, t, B, P)
         for i in range(n):
-            B.seen[i] = P.x[i]
+            B.previous[i] = P.x[i]
         solve_dense(P)
         steps += 1
         if follows and (P.info[OUTCOME] == NO_SOLUTION or steps > MAX_NEWTON):
@@ -249,7 +249,7 @@ def solve_mode_problem(S, W, t, B, P):
         for i in range(n):
             s = root_diagonal(P, i)
             least = max(least, P.grain[i] / s)
-            change = max(change, s * magnitude(P.x[i] - B.seen[i]))
+            change = max(change, s * magnitude(P.x[i] - B.previous[i]))
             size = max(size, s * magnitude(P.x[i]), magnitude(P.b[i]) / s)
         if change <= IMPULSE_TOLERANCE * size + least:
             return
@@ -264,14 +264,14 @@ def relax_impulses(S, W, t, B, P):
     """
     update_multipliers(S, W, B, P, -1, 0.0)
     for i in range(B.which.shape[0]):
-        B.seen[i] = P.x[i]
+        B.previous[i] = P.x[i]
         if B.way[i] != 0.0:
             P.const[i] = friction_reach(S, W, t, B, i, friction_load(S, W, i, B))
             for j in range(B.which.shape[0]):
                 P.gain[i, j] = 0.0
     solve_dense(P)
     for i in range(B.which.shape[0]):
-        P.x[i] = B.seen[i] + RELAXATION * (P.x[i] - B.seen[i])
+        P.x[i] = B.previous[i] + RELAXATION * (P.x[i] - B.previous[i])
 
 
 @formula
@@ -282,14 +282,14 @@ def store_switch_rates(S, W, y, B):
         most = max(most, magnitude(y[nq + d]) / S.velocity_units[d])
     for i in range(B.which.shape[0]):
         m = S.switches.measured[B.which[i]]
-        B.now[i] = B.rate[i] = B.seen[i] = 0.0
+        B.now[i] = B.rate[i] = B.previous[i] = 0.0
         if m >= 0:
             B.now[i], B.rate[i] = W.sensed.value[m], W.sensed.rate[m]
             r = S.rows.law.shape[0] + m
             for e in range(S.row_start[r], S.row_start[r + 1]):
                 d = S.column[e]
                 rounding = RATE_ROUNDING * magnitude(y[nq + d]) + VELOCITY_ROUNDING * most * S.velocity_units[d]
-                B.seen[i] += magnitude(W.G[e]) * rounding
+                B.previous[i] += magnitude(W.G[e]) * rounding
 
 
 @kernel

@@ -264,8 +264,8 @@ def solve_accelerations(S, W, t, p, work, factored):
 @formula
 def apply_all_forces(S, W, t, p, work):
     """Generalised forces into `W.velocities.applied`, and the powers of accounted forces into ``work``."""
-    if W.made[LOADS] != 0:
-        call_generated(W.made[LOADS], S, W, t, p, work, p, work)
+    if W.generated[LOADS] != 0:
+        call_generated(W.generated[LOADS], S, W, t, p, work, p, work)
         return
     inertial_wrenches(S, W)
     apply_forces(S, W, t, work)
@@ -281,9 +281,9 @@ def store_derivative(S, W, t, p, dy):
     x = W.velocities.solved
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    if W.made[FINISH] != 0:
+    if W.generated[FINISH] != 0:
         W.counts.status = (
-            0 if call_generated(W.made[FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
+            0 if call_generated(W.generated[FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
         )
         return W.counts.status
     coordinate_rates(S, p, v, dy)

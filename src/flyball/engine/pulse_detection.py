@@ -40,8 +40,8 @@ MAX_TURN = 2.0  # rotation within a step [rad] up to which the ends identify the
 UNBOUNDED = np.inf  # duration reported at a change of branch: no step is short enough
 DEPARTURE = 1e-3  # accepted deviation from the polynomial, relative to the law's change over the step
 LAW_ROUNDING = 1e-9  # deviation that is only rounding, relative to the law's size
-# rows of StepState.seen: sensors within the step; sensors and inputs of forces and their rates, at its start and at its
-# end; values at the nodes; 1 for each law that is inspected
+# rows of StepState.inspection: sensors within the step; sensors and inputs of forces and their rates, at its start and
+# at its end; values at the nodes; 1 for each law that is inspected
 INPUTS_WITHIN, NODE_VALUES, LAW_SELECTED, INSPECTION_ROWS = 0, 5, 6, 7
 
 
@@ -240,7 +240,7 @@ def sample_law(S, W, k, law, t, h, x, buffer):
     s = t + x * h
     for m in range(nm):
         buffer[INPUTS_WITHIN, m], buffer[INPUTS_WITHIN, nm + m] = input_within(buffer, m, x, h)
-    made = W.made[SAMPLED]
+    made = W.generated[SAMPLED]
     if k >= LAWS * S.forces.F.shape[0]:
         if made != 0:
             return call_generated(

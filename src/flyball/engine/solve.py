@@ -62,8 +62,8 @@ def apply_inverse_mass(S, b, x, at, out, to):
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0, or 1 + a singular unknown."""
     W.counts.factorisations += 1
-    if W.made[FACTOR] != 0:
-        return int(call_generated(W.made[FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
+    if W.generated[FACTOR] != 0:
+        return int(call_generated(W.generated[FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
     if S.sizes.solver == SCHUR:
         return factor_schur(S, W)
     if S.sizes.solver == COUPLED:
@@ -117,8 +117,8 @@ def natural_row_sizes(S, W):
 def reuse_factor(S, W):
     """Keep the last factor for rows that have changed little, as a preconditioner of the refinement."""
     if S.sizes.solver == SCHUR:
-        if W.made[REUSE] != 0:
-            call_generated(W.made[REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
+        if W.generated[REUSE] != 0:
+            call_generated(W.generated[REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
         else:
             rows_by_inverse_mass(S, W)
 
@@ -181,7 +181,7 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     relative to the size of its terms.
     """
     W.counts.solves += 1
-    if W.made[STEP] != 0:
+    if W.generated[STEP] != 0:
         return solve_generated(S, W, f, gamma, x, lam, loaded, refinements)
     for d in range(x.shape[0]):
         x[d] = W.velocities.prescribed[d] if loaded else 0.0
@@ -199,10 +199,10 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 @formula
 def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
     """Solve by code generated for the mechanism, with refinement passes until the residual passes or stops falling."""
-    worst = call_generated(W.made[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
+    worst = call_generated(W.generated[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = last_off = 1e300
-    for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
-        worst = call_generated(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
+    for _ in range(refinements + 1 if W.generated[REFINE] != 0 else 0):
+        worst = call_generated(W.generated[REFINE], S, W, 0.0, f, gamma, x, lam)
         off = W.flat[ROW_RESIDUAL].real
         if not worst > W.options.solve_tolerance or is_stalled(W, lam, worst, last, off, last_off):
             break

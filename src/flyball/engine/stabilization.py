@@ -28,8 +28,8 @@ from .solve import MAX_REFINEMENTS, factor, reuse_factor, solve
 @formula
 def set_prescribed(S, W, t, q, v):
     """Normalise quaternions; set prescribed coordinates, velocities and accelerations from their laws."""
-    if W.made[PREPARE] != 0:
-        call_generated(W.made[PREPARE], S, W, t, q, v, q, v)
+    if W.generated[PREPARE] != 0:
+        call_generated(W.generated[PREPARE], S, W, t, q, v, q, v)
         return
     normalise_quaternions(S, q)
     for b in range(S.tree.parent.shape[0]):
@@ -60,8 +60,8 @@ HOPELESS_VIOLATION = 1e3  # relative to the mechanism's length: a state with a l
 def update_positions(S, W, t, q, z):
     """Update poses and the position-dependent part of the rows: g, G, nu. ``z`` holds the turns of angles."""
     W.counts.evaluations += 1
-    if W.made[PLACE] != 0:
-        call_generated(W.made[PLACE], S, W, t, q, z, q, z)
+    if W.generated[PLACE] != 0:
+        call_generated(W.generated[PLACE], S, W, t, q, z, q, z)
     else:
         update_poses(S, W, q)
         row_values(S, W, t, z)
@@ -70,8 +70,8 @@ def update_positions(S, W, t, q, z):
 @formula
 def update_velocities(S, W, t, v, z):
     """Update velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
-    if W.made[MOVE] != 0:
-        call_generated(W.made[MOVE], S, W, t, v, z, v, z)
+    if W.generated[MOVE] != 0:
+        call_generated(W.generated[MOVE], S, W, t, v, z, v, z)
     else:
         update_motions(S, W, v)
         row_biases(S, W, t, v, z)
@@ -94,8 +94,8 @@ def position_violation(S, W, out):
 @formula
 def update_shown_frames(S, W, q):
     """Update the poses of frames that only results need, where the generated code has left them out."""
-    if W.made[SHOW] != 0:
-        call_generated(W.made[SHOW], S, W, 0.0, q, q, q, q)
+    if W.generated[SHOW] != 0:
+        call_generated(W.generated[SHOW], S, W, 0.0, q, q, q, q)
 
 
 @formula
@@ -112,8 +112,8 @@ def position_rounding(S, W, q):
 @formula
 def velocity_violation(S, W, v, out):
     """Largest |G v - nu| and the size of its largest term, as speeds; nu - G v goes to ``out``."""
-    if W.made[DRIFT] != 0:
-        worst = call_generated(W.made[DRIFT], S, W, 0.0, v, out, v, out)
+    if W.generated[DRIFT] != 0:
+        worst = call_generated(W.generated[DRIFT], S, W, 0.0, v, out, v, out)
         return worst, W.flat[TERMS]
     worst = 0.0
     size = 0.0

@@ -291,7 +291,7 @@ class Health:
     crowd: int = 0  # bodies in sets, whose degrees of freedom are not counted
     remarks: tuple[str, ...] = ()  # warnings of the analysis itself
     departures: tuple[InitialDeviation, ...] = ()  # unsatisfied numbers of the description: element, given, got
-    watched: str = ""  # resolution of event detection
+    event_detection: str = ""  # resolution of event detection
     compiling: float = 0.0  # part of these seconds for compiling or loading code at first calls [s]
     events: str = ""  # number of events, and how often each occurred
     contact: ContactHealth | None = None  # contact solver, if there are contacts
@@ -410,8 +410,8 @@ class Health:
         if crept:
             text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())
             out.append(("creep of friction", text))
-        if self.watched:
-            out.append(("watched", self.watched))
+        if self.event_detection:
+            out.append(("event detection", self.event_detection))
         if self.events:
             out.append(("events", self.events))
         if self.contact:

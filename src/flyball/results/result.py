@@ -569,7 +569,7 @@ def _joined_health(every: Sequence[Health]) -> Health:
         **{name: getattr(first, name) for name in ("coordinates", "engine", "departures", "options")},
         method=_joined_method([h.method for h in every]),
         remarks=tuple(dict.fromkeys(r for h in every for r in h.remarks)),
-        watched=next((h.watched for h in reversed(every) if h.watched), ""),
+        event_detection=next((h.event_detection for h in reversed(every) if h.event_detection), ""),
         contact=_joined_contact_health([h.contact for h in every if h.contact]),
         late={},
     )

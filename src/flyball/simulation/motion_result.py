@@ -132,7 +132,7 @@ def make_result(
     health = _health(start, clock, o)
     ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE
-    health.watched, health.method = here.detection_remark, here.method
+    health.event_detection, health.method = here.detection_remark, here.method
     health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
     cuts = list(accumulate((1, s.nq, s.nv, len(s.states), s.nv), initial=0))

@@ -117,7 +117,7 @@ def _pair_properties(scene: ContactTables, i: int, j: int) -> np.ndarray | None:
     """Contact properties of the surfaces of two shapes, if they may touch."""
     x = scene.geometry.shape
     a, b = int(x.mover[i]), int(x.mover[j])
-    apart = scene.geometry.apart
+    apart = scene.geometry.excluded_pairs
     if a == b or not (x.mask[i] & x.member[j] and x.mask[j] & x.member[i]):
         return None
     if len(apart) and (apart == (min(a, b), max(a, b))).all(axis=1).any():

@@ -435,7 +435,7 @@ class Work(NamedTuple):
     y: Number2  # (3, ny): trial states
     options: Options
     counts: Counts
-    made: Int1  # (15,): while generated code is in use, its addresses as in `System.flat`; else 0
+    generated: Int1  # (15,): while generated code is in use, its addresses as in `System.flat`; else 0
     flat: Number1  # scratch of the generated code
 
 

@@ -143,7 +143,7 @@ def record_motion(
         lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
         joints=joints,
         channels=channels,
-        shown=initial_channels(result, [c.name for c in channels]),
+        plotted=initial_channels(result, [c.name for c in channels]),
         size=looks.size,
         notes=notes,
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),

@@ -132,7 +132,7 @@ def pack_recording(recording: Recording) -> bytes:
         "planar": bool(recording.planar),
         "size": float(recording.size),
         "notes": {str(term): str(text) for term, text in recording.notes.items()},
-        "shown": list(recording.shown),
+        "shown": list(recording.plotted),
         "show": list(recording.show),
         "facts": {part: list(lines) for part, lines in recording.facts.items()},
         "down": _float_list(recording.down),

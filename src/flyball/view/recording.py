@@ -244,7 +244,7 @@ class Picture:
     name: str
     title: str
     t: np.ndarray
-    shown: Figure | PointPaths
+    content: Figure | PointPaths
     marks: tuple[Mark, ...] = ()
 
 
@@ -278,7 +278,7 @@ class Recording:
     lines: tuple[RecordedLine, ...] = ()
     joints: tuple[RecordedJoint, ...] = ()
     channels: tuple[Channel, ...] = ()
-    shown: tuple[str, ...] = ()  # the channels plotted when the page opens
+    plotted: tuple[str, ...] = ()  # the channels plotted when the page opens
     size: float = 1.0  # a typical length of the mechanism [m]: joint symbols and coils scale with it
     notes: dict[str, str] = field(default_factory=dict)  # summary lines shown beside the picture
     curves: tuple[RecordedCurve, ...] = ()

@@ -43,7 +43,7 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> list[Path]:
     written = [folder / f"{p.name}.png" for p in pictures]
     with plot_style():
         for picture, path in zip(pictures, written, strict=True):
-            shown = picture.shown
+            shown = picture.content
             drawing = _curves_figure(picture, shown) if isinstance(shown, Figure) else _paths_figure(shown)
             set_title(drawing, picture.title)
             finish_figure(drawing, path)

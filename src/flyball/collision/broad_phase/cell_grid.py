@@ -239,7 +239,7 @@ def sort_shapes(G, M, B):
     """Assign new slots and envelopes to all bounded shapes; restarts the frame."""
     for c in range(3):
         B.frame.origin[c] = B.frame.lag[c] = 0.0
-        B.frame.step[c] = B.real.ahead * B.frame.velocity[c]
+        B.frame.step[c] = B.real.horizon * B.frame.velocity[c]
     make_envelopes(G, M, B)
     number_slots(B, lay_out_levels(B))
     fill_slots(G, M, B)

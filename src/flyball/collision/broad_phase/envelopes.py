@@ -101,10 +101,10 @@ def write_envelope(B, now, envelope, s, still):
     skin = B.real.skin * size
     if still and B.count.frame_moves == 0:
         skin = 0.0
-    time = ENVELOPE_STEPS * B.real.ahead
+    time = ENVELOPE_STEPS * B.real.horizon
     if (speed + spin) * time > ENVELOPE_LEAD * size:
         time = ENVELOPE_LEAD * size / (speed + spin)
-    time += B.real.ahead
+    time += B.real.horizon
     half = 0.5 * time
     for c in range(3):
         envelope.middle[s, c] = now.centre[s, c] - B.frame.origin[c] + half * u[c]
@@ -140,10 +140,10 @@ def is_inside_envelope(B, s, ball):
     tiny = 1e-12 * now.radius[s]
     if allowed < -tiny or squared_distance_to_axis(fat, s, x, y, z) > (allowed + tiny) ** 2:
         return False
-    x += (now.velocity[s, 0] - frame.velocity[0]) * real.ahead
-    y += (now.velocity[s, 1] - frame.velocity[1]) * real.ahead
-    z += (now.velocity[s, 2] - frame.velocity[2]) * real.ahead
-    allowed -= now.turning_speed[s] * real.ahead
+    x += (now.velocity[s, 0] - frame.velocity[0]) * real.horizon
+    y += (now.velocity[s, 1] - frame.velocity[1]) * real.horizon
+    z += (now.velocity[s, 2] - frame.velocity[2]) * real.horizon
+    allowed -= now.turning_speed[s] * real.horizon
     return allowed >= -tiny and squared_distance_to_axis(fat, s, x, y, z) <= (allowed + tiny) ** 2
 
 
@@ -225,7 +225,7 @@ def plane_advance(B, w):
     a = x.normal[w, 0] * (x.velocity[w, 0] - B.frame.velocity[0])
     a += x.normal[w, 1] * (x.velocity[w, 1] - B.frame.velocity[1])
     a += x.normal[w, 2] * (x.velocity[w, 2] - B.frame.velocity[2])
-    return B.real.ahead * max(0.0, a)
+    return B.real.horizon * max(0.0, a)
 
 
 @formula
@@ -263,7 +263,7 @@ def envelope_reaches_plane(B, w, s):
     deep = half_extent(B, B.turn, s, (x.normal[w, 0], x.normal[w, 1], x.normal[w, 2]))
     reach = B.envelope.radius[s] + 0.5 * B.real.margin - B.now.radius[s] + deep + x.slack[w]
     if turns > 0.0:
-        reach += B.real.ahead * sqrt(turns * far)
+        reach += B.real.horizon * sqrt(turns * far)
     return gap - abs(lead) <= reach
 
 
@@ -294,7 +294,7 @@ def set_frame(M, B):
     for s in range(B.count.bounded + B.count.wide):  # fixed shapes may stop movers
         goes = goes and B.slot.mover[s] >= 0
     slow = SLOWEST_FRAME * B.real.skin * B.real.typical_radius
-    goes = goes and mean2 * (ENVELOPE_STEPS * B.real.ahead) ** 2 > n * slow * slow
+    goes = goes and mean2 * (ENVELOPE_STEPS * B.real.horizon) ** 2 > n * slow * slow
     for c in range(3):
         B.frame.velocity[c] = v[c] / n if goes else 0.0
     B.count.frame_moves = 1 if goes else 0

@@ -54,7 +54,7 @@ def may_touch(G, B, s, t):
         i, j = B.slot.shape_index[s], B.slot.shape_index[t]
         if G.shape.member[i] & G.shape.mask[j] == 0 or G.shape.member[j] & G.shape.mask[i] == 0:
             return False
-    return G.apart.shape[0] == 0 or not is_excluded(G.apart, a, b)
+    return G.excluded_pairs.shape[0] == 0 or not is_excluded(G.excluded_pairs, a, b)
 
 
 @formula
@@ -121,7 +121,7 @@ def add_pair(G, B, s, t):
     elif a == IS_SPHERE and b == IS_PLANE:
         way = SPHERE_PLANE
     B.pair.first[n], B.pair.second[n], B.pair.kind[n] = s, t, way
-    B.seen[B.count.current_half, n] = stored_contact(B, i, j)
+    B.first_contacts[B.count.current_half, n] = stored_contact(B, i, j)
     B.count.pairs = n + 1
     return True
 
@@ -213,10 +213,19 @@ def drop_moved(B):
     """Remove pairs of marked slots from the list, and store their contacts in the hash table."""
     n, half = 0, B.count.current_half
     for k in range(B.count.pairs):
-        s, t, first = B.pair.first[k] + 0, B.pair.second[k] + 0, B.seen[half, k] + 0  # all integers of one type
+        s, t, first = (
+            B.pair.first[k] + 0,
+            B.pair.second[k] + 0,
+            B.first_contacts[half, k] + 0,
+        )  # all integers of one type
         if B.mark[s] == 0 and B.mark[t] == 0:
             if n < k:
-                B.pair.first[n], B.pair.second[n], B.pair.kind[n], B.seen[half, n] = s, t, B.pair.kind[k], first
+                B.pair.first[n], B.pair.second[n], B.pair.kind[n], B.first_contacts[half, n] = (
+                    s,
+                    t,
+                    B.pair.kind[k],
+                    first,
+                )
             n += 1
         elif first >= 0:
             store_pair(B, B.slot.shape_index[s], B.slot.shape_index[t], first)

@@ -27,7 +27,7 @@ class SearchReals(Record, kind="Float"):
 
     margin: float  # largest gap of a contact between shapes that do not approach [m]
     skin: float  # displacement, relative to the radius, after which the pairs of a shape are listed again
-    ahead: float  # time until the next search [s]: shapes that may touch within it have a contact
+    horizon: float  # time until the next search [s]: shapes that may touch within it have a contact
     typical_radius: float  # [m]
     query_reach: float  # largest gap requested from the narrow phase [m]
 
@@ -157,7 +157,7 @@ class PairTable(NamedTuple):
 
     names: Int1  # (places,)
     firsts: Int1  # (places,): their first contacts
-    taken: Int1  # (places / 2,): places in use
+    occupied: Int1  # (places / 2,): places in use
 
 
 class Search(NamedTuple):
@@ -185,9 +185,9 @@ class Search(NamedTuple):
     level_grid: LevelGrid
     sums: SizeGroups  # (classes * SIZE_LEVELS)
     pair: SlotPairs
-    seen: Short2  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
+    first_contacts: Short2  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
     mark: Int1  # (ns,): by slot, 1 if it has left its envelope
     moved: Int1  # (ns,): those slots
     table: PairTable
-    room: Float2  # (SCRATCH_ROWS, 8): of the narrow phase
-    kept: Float2  # (2, 12): stored poses of a pair that is advanced
+    narrow_phase_contacts: Float2  # (SCRATCH_ROWS, 8): of the narrow phase
+    stored_pose: Float2  # (2, 12): stored poses of a pair that is advanced

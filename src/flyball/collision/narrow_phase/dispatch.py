@@ -3,7 +3,7 @@
 The list of special pairs comes from the files of `special_pairs`; any other pair is a generic convex pair
 (`distance`). Kernels are compiled separately from the search, in variants for fewer kinds, so that shapes that do
 not occur are not compiled. A kernel writes the contacts of the two shapes named in its workspace to
-`Search.room`, and returns their number.
+`Search.narrow_phase_contacts`, and returns their number.
 """
 
 from __future__ import annotations
@@ -106,19 +106,23 @@ def collide_convex(G, M, i, j, reach, scratch):
 @kernel
 def between(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of shapes of any kind."""
-    return collide(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
+    return collide(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.narrow_phase_contacts)
 
 
 @kernel
 def between_convex(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of convex shapes."""
-    return collide_convex(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
+    return collide_convex(
+        G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.narrow_phase_contacts
+    )
 
 
 @kernel
 def between_planar(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Contacts of shapes of planar mechanisms."""
-    return collide_planar(G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.room)
+    return collide_planar(
+        G, M, B.count.query_shape_1, B.count.query_shape_2, B.real.query_reach, B.narrow_phase_contacts
+    )
 
 
 @kernel

@@ -414,7 +414,7 @@ def accumulate_line_residuals(P, X, O, wide, free_wide, sofar):
 def finish_solve(P, X, W, O, residual, used, last):
     """Store the residuals of the impulses; after the last iteration, limit the impulses and write the solution.
 
-    The impulses are in X, the velocities with them in W.own and X.wide, those without in X.v and W.free_wide;
+    The impulses are in X, the velocities with them in W.node_state and X.wide, those without in X.v and W.free_wide;
     ``residual`` is the result of `residuals`.
     """
     velocity, force, linear, square = residual
@@ -449,7 +449,7 @@ def write_back(P, X, W, O, part):
     for e in range(begin, end):
         i = P.member[e]
         for s in range(6):
-            X.v[i, s] = blend(part, X.v[i, s], W.own[i, s])
+            X.v[i, s] = blend(part, X.v[i, s], W.node_state[i, s])
     if part == 1.0:
         return
     for s in range(X.wide.shape[0]):

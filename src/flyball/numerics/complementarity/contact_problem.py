@@ -184,11 +184,11 @@ class ContactWorkspace(NamedTuple):
     nodes: Float3  # (6, nn, 8)
     wide: Float2  # (6, nw): for the velocities of groups
     lines: Float2  # (9, nl): vectors of lines, as ``rows``
-    own: Float2  # (nn + 1, 8): of each node v, w, 1/m, mean of its block's diagonal; the last row is immovable
+    node_state: Float2  # (nn + 1, 8): of each node v, w, 1/m, mean of its block's diagonal; the last row is immovable
     inner: Float2  # (nn + 1, 8): inverse inertia block of each node, two unused
     free: Float2  # (nn + 1, 8): v, w without impulses, two unused
     free_wide: Float1  # velocities of the groups without impulses
-    sides: Int2  # (nc, 3): in the order of sweeps the two nodes in ``own`` and the number of the contact
+    contact_nodes: Int2  # (nc, 3): in the order of sweeps the two nodes in ``node_state`` and the number of the contact
     spheres: SphereContacts  # (nc): contacts in that order, each in the table of its kind
     frictionless: FrictionlessContacts  # (nc)
     frictional: FrictionalContacts  # (nc): also those of groups
@@ -278,11 +278,11 @@ def allocate_solver(
         nodes=np.zeros((6, nn, 8)),
         wide=np.zeros((6, nw)),
         lines=np.zeros((9, nl)),
-        own=cache_aligned(nn + 1, 8),
+        node_state=cache_aligned(nn + 1, 8),
         inner=cache_aligned(nn + 1, 8),
         free=cache_aligned(nn + 1, 8),
         free_wide=np.zeros(nw),
-        sides=np.zeros((nc, 3), np.int64),
+        contact_nodes=np.zeros((nc, 3), np.int64),
         spheres=cache_aligned(nc, SphereContacts.layout.width).view(SphereContacts),
         frictionless=cache_aligned(nc, FrictionlessContacts.layout.width).view(FrictionlessContacts),
         frictional=cache_aligned(nc, FrictionalContacts.layout.width).view(FrictionalContacts),

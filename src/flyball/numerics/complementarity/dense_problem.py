@@ -61,7 +61,7 @@ class DenseProblem(NamedTuple):
     rule: Int1  # (n,)
     const: Float1  # (n,)
     gain: Float2  # (n, n)
-    lean: Float1  # (n,)
+    bound_sign: Float1  # (n,)
     state: Int1  # (n,): initial guess, and result
     x: Float1  # (n,)
     u: Float1  # (n,)
@@ -130,7 +130,7 @@ def assemble_equations(P):
         elif state == AT_HIGH:
             of_reach = -1.0
         elif state == SLIDES_AS_GIVEN:
-            of_reach = P.lean[i]
+            of_reach = P.bound_sign[i]
         for j in range(n):
             P.K[i, j] = P.N[i, j] if state == AT_REST else of_reach * P.scaled_gain[i, j]
         P.K[i, i] += SOFTENING if state == AT_REST else 1.0
@@ -236,7 +236,7 @@ def equation_residual(P, x, i):
     reach = scaled_reach(P, x, i)
     if state == AT_HIGH:
         return reach - x[i]
-    return (-reach if state == AT_LOW else -P.lean[i] * reach) - x[i]
+    return (-reach if state == AT_LOW else -P.bound_sign[i] * reach) - x[i]
 
 
 @formula

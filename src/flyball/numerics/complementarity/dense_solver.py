@@ -101,9 +101,9 @@ def reduce_problem(P):
             P.Q[0, i, n] = P.row[SCALED_BIAS, i]
         elif rule == SLIDING:
             for j in range(n):
-                P.Q[0, i, j] = P.lean[i] * P.scaled_gain[i, j]
+                P.Q[0, i, j] = P.bound_sign[i] * P.scaled_gain[i, j]
             P.Q[0, i, i] += 1.0
-            P.Q[0, i, n] = P.lean[i] * P.row[SCALED_CONST, i]
+            P.Q[0, i, n] = P.bound_sign[i] * P.row[SCALED_CONST, i]
     if not eliminate_rows(P):
         return False
     for i in range(n):

@@ -83,7 +83,7 @@ def pyramid_sliding_friction(d, angle):
 def update_pyramid(P, X, W, c, at, d):
     """Update one contact: the normal impulse, then the tangential one; returns the largest change of a velocity."""
     k = W.frictional
-    u, p = contact_velocity(P, W.own, X.wide, c), k.impulse[at, 0]
+    u, p = contact_velocity(P, W.node_state, X.wide, c), k.impulse[at, 0]
     n = max(p - (u[0] + k.bias[at, 0] + k.soft[at] * p) * k.inverse_nn[at], k.least[at])
     x = k.impulse[at, 1] - k.sliding_step[at] * (u[1] + k.bias[at, 1] + k.ns[at] * (n - p))
     y = k.impulse[at, 2] - k.sliding_step[at] * (u[2] + k.bias[at, 2] + k.nt[at] * (n - p))
@@ -91,7 +91,7 @@ def update_pyramid(P, X, W, c, at, d):
     change = n - p, x - k.impulse[at, 1], y - k.impulse[at, 2]
     k.impulse[at, 0], k.impulse[at, 1], k.impulse[at, 2] = n, x, y
     X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, x, y
-    apply_contact_impulse(P, W.own, X.wide, c, change)
+    apply_contact_impulse(P, W.node_state, X.wide, c, change)
     moved = abs(change[0]) + abs(change[1]) + abs(change[2])
     return moved / k.inverse_nn[at] if moved > 0.0 else 0.0
 
@@ -99,7 +99,7 @@ def update_pyramid(P, X, W, c, at, d):
 @formula
 def pyramid_residuals(P, X, W, O, worst):
     """Residuals for `finish_solve`: the residual is the change in the last sweep, the objective is exact."""
-    _, _, linear, square = residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide))
+    _, _, linear, square = residuals(P, X, O, (W.node_state, X.wide, W.free, W.free_wide))
     first, last = contact_range(P, O)
     most, step = 0.0, 0.0
     for c in range(first, last):
@@ -141,7 +141,7 @@ def pyramid(
         turned, worst = used % 2 == 1, 0.0
         for e in range(n):
             s = n - 1 - e if turned else e
-            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], s, O.count.directions))
+            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.contact_nodes[s, 2], s, O.count.directions))
         worst = larger_or_nan(worst, sweep_lines(P, X, O, turned))
         used += 1
         if O.count.history:

@@ -73,7 +73,7 @@ def update_general(P, X, W, O, c, at):
     if P.turn.shape[0] > 0:
         update_rolling(P, X, W, O, c, at)
     else:
-        q = local_impulse(k, at, contact_velocity(P, W.own, X.wide, c), O.count.coulomb)
+        q = local_impulse(k, at, contact_velocity(P, W.node_state, X.wide, c), O.count.coulomb)
         set_impulse(P, X, W, c, at, q)
     d = abs(k.impulse[at, 0] - n) + abs(k.impulse[at, 1] - s) + abs(k.impulse[at, 2] - t)
     return d / k.inverse_nn[at] if d > 0.0 else 0.0
@@ -86,7 +86,7 @@ def set_impulse(P, X, W, c, at, q):
     d = q[0] - k.impulse[at, 0], q[1] - k.impulse[at, 1], q[2] - k.impulse[at, 2]
     if d[0] != 0.0 or d[1] != 0.0 or d[2] != 0.0:
         k.impulse[at, 0], k.impulse[at, 1], k.impulse[at, 2] = q
-        apply_contact_impulse(P, W.own, X.wide, c, d)
+        apply_contact_impulse(P, W.node_state, X.wide, c, d)
 
 
 @formula
@@ -94,7 +94,7 @@ def set_torque_impulse(P, X, W, c, z, x, y):
     """Set the torque impulse, and update the velocities."""
     d = z - X.torque[c, 0], x - X.torque[c, 1], y - X.torque[c, 2]
     X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = z, x, y
-    apply_torque_impulse(P, W.own, X.wide, c, d)
+    apply_torque_impulse(P, W.node_state, X.wide, c, d)
 
 
 @formula
@@ -106,17 +106,17 @@ def update_rolling(P, X, W, O, c, at):
     """
     steps = local_step_sizes(rolling_diagonal_block(P, c), 0.0, 0)
     spin, roll = steps[0], steps[6]
-    u = contact_velocity(P, W.own, X.wide, c)
+    u = contact_velocity(P, W.node_state, X.wide, c)
     if O.count.coulomb:
         set_impulse(P, X, W, c, at, local_impulse(W.frictional, at, u, 1))
         n = W.frictional.impulse[at, 0]
-        w = contact_angular_velocity(P, W.own, X.wide, c)
+        w = contact_angular_velocity(P, W.node_state, X.wide, c)
         z, x, y = X.torque[c, 0] - spin * w[0], X.torque[c, 1] - roll * w[1], X.torque[c, 2] - roll * w[2]
         a, b = fraction_within(n, P.turn[c, 0], sqrt(x * x + y * y)), fraction_within(n, P.turn[c, 1], abs(z))
         set_torque_impulse(P, X, W, c, b * z, a * x, a * y)
     else:
         q, o = project_rolling_step(
-            P, X, W.frictional, c, at, u, contact_angular_velocity(P, W.own, X.wide, c), (spin, roll)
+            P, X, W.frictional, c, at, u, contact_angular_velocity(P, W.node_state, X.wide, c), (spin, roll)
         )
         set_impulse(P, X, W, c, at, q)
         set_torque_impulse(P, X, W, c, o[0], o[1], o[2])
@@ -245,16 +245,16 @@ def frictional_terms(k, v, free, i, j, at, s, coulomb):
 @formula
 def packed_terms(P, X, W, O, kind, s):
     """Residual terms of the contact of a kind at visit s."""
-    i, j, c = W.sides[s, 0], W.sides[s, 1], W.sides[s, 2]
+    i, j, c = W.contact_nodes[s, 0], W.contact_nodes[s, 1], W.contact_nodes[s, 2]
     if kind == SMOOTH_SPHERE:
-        return smooth_sphere_terms(W.spheres, W.own, W.free, i, j, s)
+        return smooth_sphere_terms(W.spheres, W.node_state, W.free, i, j, s)
     if kind == SPHERE:
-        return sphere_terms(W.spheres, W.own, W.free, i, j, s, O.count.coulomb)
+        return sphere_terms(W.spheres, W.node_state, W.free, i, j, s, O.count.coulomb)
     if kind == FRICTIONLESS:
-        return frictionless_terms(W.frictionless, W.own, W.free, i, j, s)
+        return frictionless_terms(W.frictionless, W.node_state, W.free, i, j, s)
     if kind == FRICTIONAL:
-        return frictional_terms(W.frictional, W.own, W.free, i, j, s, W.rows[1, c, 0], O.count.coulomb)
-    return contact_terms(P, X, O, (W.own, X.wide, X.v, W.free_wide), c)
+        return frictional_terms(W.frictional, W.node_state, W.free, i, j, s, W.rows[1, c, 0], O.count.coulomb)
+    return contact_terms(P, X, O, (W.node_state, X.wide, X.v, W.free_wide), c)
 
 
 @formula
@@ -280,11 +280,13 @@ def sweep_spheres(W, O, many, backwards):
     worst = 0.0
     for e in range(many[SMOOTH_SPHERE]):
         s = visit_index(e, many[SMOOTH_SPHERE], backwards)
-        worst = max(worst, update_smooth_sphere(W.spheres, W.own, W.sides[s, 0], W.sides[s, 1], s))
+        i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
+        worst = max(worst, update_smooth_sphere(W.spheres, W.node_state, i, j, s))
     begin = many[SMOOTH_SPHERE]
     for e in range(many[SPHERE]):
         s = begin + visit_index(e, many[SPHERE], backwards)
-        worst = max(worst, update_sphere(W.spheres, W.own, W.sides[s, 0], W.sides[s, 1], s, O.count.coulomb))
+        i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
+        worst = max(worst, update_sphere(W.spheres, W.node_state, i, j, s, O.count.coulomb))
     return worst
 
 
@@ -294,16 +296,17 @@ def sweep_other_contacts(P, X, W, O, many, backwards):
     worst, begin = 0.0, many[SMOOTH_SPHERE] + many[SPHERE]
     for e in range(many[FRICTIONLESS]):
         s = begin + visit_index(e, many[FRICTIONLESS], backwards)
-        worst = max(worst, update_frictionless(W.frictionless, W.own, W.sides[s, 0], W.sides[s, 1], s))
+        i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
+        worst = max(worst, update_frictionless(W.frictionless, W.node_state, i, j, s))
     begin += many[FRICTIONLESS]
     for e in range(many[FRICTIONAL]):
         s = begin + visit_index(e, many[FRICTIONAL], backwards)
-        i, j = W.sides[s, 0], W.sides[s, 1]
-        worst = max(worst, update_frictional(W.frictional, W.own, W.inner, i, j, s, O.count.coulomb))
+        i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
+        worst = max(worst, update_frictional(W.frictional, W.node_state, W.inner, i, j, s, O.count.coulomb))
     begin += many[FRICTIONAL]
     for e in range(many[4]):
         s = begin + visit_index(e, many[4], backwards)
-        worst = max(worst, update_general(P, X, W, O, W.sides[s, 2], s))
+        worst = max(worst, update_general(P, X, W, O, W.contact_nodes[s, 2], s))
     return worst
 
 
@@ -333,7 +336,7 @@ def sweep(P, X, W, O, many, backwards):
 def unpack_impulses(P, X, W, many):
     """Copy packed impulses back to X."""
     for at in range(many[0] + many[1] + many[2] + many[3] + many[4]):
-        c = W.sides[at, 2]
+        c = W.contact_nodes[at, 2]
         if at < many[0] + many[1]:
             a, b, d = (
                 W.spheres.tangent[at, 0],

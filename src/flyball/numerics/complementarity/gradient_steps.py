@@ -3,7 +3,7 @@
 The metric is that of the diagonal blocks (or 1), so a step of size 1 is comparable to one of Gauss-Seidel. Vectors
 are planes of `ContactWorkspace.rows`, by visit: impulses in the first four, their velocities N p in three more, b =
 D v + bias in the last; torques are eight planes further, lines in `ContactWorkspace.lines`. Impulses of spheres are
-vectors in world axes; of all others along the frame. Velocities of products are in W.own and X.wide.
+vectors in world axes; of all others along the frame. Velocities of products are in W.node_state and X.wide.
 
 One pass takes a gradient step for all contacts and applies its impulses; another forms the product with N. Before the
 iterations contacts are packed and the warm start is loaded; after them the result is written back.
@@ -144,7 +144,7 @@ def clear_velocities(P, X, W, O):
     begin, end = node_range(P, O)
     for e in range(begin, end):
         for k in range(6):
-            W.own[P.member[e], k] = 0.0
+            W.node_state[P.member[e], k] = 0.0
     for k in range(X.wide.shape[0]):
         X.wide[k] = 0.0
 
@@ -178,13 +178,13 @@ def gradient_step(P, X, W, O, many, ids, par):
             extrapolated(W, ucur, uprev, beta, s),
             extrapolated(W, BIAS_PLANE, BIAS_PLANE, 0.0, s),
         )
-        g, i, j = (u[0] + b[0], u[1] + b[1], u[2] + b[2]), W.sides[s, 0], W.sides[s, 1]
+        g, i, j = (u[0] + b[0], u[1] + b[1], u[2] + b[2]), W.contact_nodes[s, 0], W.contact_nodes[s, 1]
         if ball:
             x, more, square = step_sphere(W.spheres, s, y, g, size, coulomb)
-            apply_sphere_impulse(W.spheres, W.own, i, j, s, (0.0, x[0], x[1], x[2]))
+            apply_sphere_impulse(W.spheres, W.node_state, i, j, s, (0.0, x[0], x[1], x[2]))
         else:
             x, more, square = step_frictional(W.frictional, s, y, g, size, coulomb)
-            apply_frictional_impulse(W.frictional, W.own, W.inner, i, j, s, x)
+            apply_frictional_impulse(W.frictional, W.node_state, W.inner, i, j, s, x)
         set_vector(W, new, s, x)
         dd, worst = dd + more, larger_or_nan(worst, square)
         gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
@@ -196,14 +196,14 @@ def apply_vector(P, X, W, O, many, a):
     """Apply vector a, without torques and lines, to the velocities."""
     clear_velocities(P, X, W, O)
     for s in range(many[SPHERE] + many[FRICTIONAL]):
-        i, j, x = W.sides[s, 0], W.sides[s, 1], extrapolated(W, a, a, 0.0, s)
+        i, j, x = W.contact_nodes[s, 0], W.contact_nodes[s, 1], extrapolated(W, a, a, 0.0, s)
         if s < many[SPHERE]:
-            apply_sphere_impulse(W.spheres, W.own, i, j, s, (0.0, x[0], x[1], x[2]))
+            apply_sphere_impulse(W.spheres, W.node_state, i, j, s, (0.0, x[0], x[1], x[2]))
         else:
-            apply_frictional_impulse(W.frictional, W.own, W.inner, i, j, s, x)
+            apply_frictional_impulse(W.frictional, W.node_state, W.inner, i, j, s, x)
     begin = general_start(many)
     for s in range(begin, begin + many[4]):
-        apply_contact_impulse(P, W.own, X.wide, W.sides[s, 2], extrapolated(W, a, a, 0.0, s))
+        apply_contact_impulse(P, W.node_state, X.wide, W.contact_nodes[s, 2], extrapolated(W, a, a, 0.0, s))
 
 
 @formula
@@ -230,7 +230,7 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
     dd, gs, worst = sums
     begin = general_start(many)
     for s in range(begin, begin + many[4]):
-        c = W.sides[s, 2]
+        c = W.contact_nodes[s, 2]
         y, u, b = (
             extrapolated(W, cur, prev, beta, s),
             extrapolated(W, ucur, uprev, beta, s),
@@ -249,11 +249,11 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
             for e in range(3):
                 gs += h[e] * (q[e] - W.rows[TORQUE_OFFSET + cur, s, e])
             set_vector(W, TORQUE_OFFSET + new, s, q)
-            apply_torque_impulse(P, W.own, X.wide, c, q)
+            apply_torque_impulse(P, W.node_state, X.wide, c, q)
         else:
             x, more, square = step_frictional(W.frictional, s, y, g, size, coulomb)
         set_vector(W, new, s, x)
-        apply_contact_impulse(P, W.own, X.wide, c, x)
+        apply_contact_impulse(P, W.node_state, X.wide, c, x)
         dd, worst = dd + more, larger_or_nan(worst, square)
         gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
     first, last = line_range(P, O)
@@ -267,7 +267,7 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
 @formula
 def visit_velocity(P, X, W, at, ball, new):
     """N x of visit ``at`` for vector ``new``, without torque."""
-    v, i, j = W.own, W.sides[at, 0], W.sides[at, 1]
+    v, i, j = W.node_state, W.contact_nodes[at, 0], W.contact_nodes[at, 1]
     x = extrapolated(W, new, new, 0.0, at)
     if ball:
         u = sphere_sliding_velocity(
@@ -328,13 +328,13 @@ def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
     total, square = sums
     begin = general_start(many)
     for s in range(begin, begin + many[4]):
-        c = W.sides[s, 2]
+        c = W.contact_nodes[s, 2]
         x, y, w = (
             extrapolated(W, new, new, 0.0, s),
             extrapolated(W, cur, prev, beta, s),
             extrapolated(W, ucur, uprev, beta, s),
         )
-        u = contact_velocity(P, W.own, X.wide, c)
+        u = contact_velocity(P, W.node_state, X.wide, c)
         u = u[0] + P.soft[c] * x[0], u[1], u[2]
         set_vector(W, unew, s, u)
         w = u[0] - w[0], u[1] - w[1], u[2] - w[2]
@@ -346,7 +346,7 @@ def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
                 extrapolated(W, TORQUE_OFFSET + cur, TORQUE_OFFSET + prev, beta, s),
             )
             u, w = (
-                contact_angular_velocity(P, W.own, X.wide, c),
+                contact_angular_velocity(P, W.node_state, X.wide, c),
                 extrapolated(W, TORQUE_OFFSET + ucur, TORQUE_OFFSET + uprev, beta, s),
             )
             set_vector(W, TORQUE_OFFSET + unew, s, u)
@@ -377,7 +377,7 @@ def begin_iterations(P, X, W, O, unit_metric):
     for s in range(last - first):
         load_visit(P, X, W, many, s)
         if P.turn.shape[0] > 0:
-            steps = local_step_sizes(rolling_diagonal_block(P, W.sides[s, 2]), 0.0, 0)
+            steps = local_step_sizes(rolling_diagonal_block(P, W.contact_nodes[s, 2]), 0.0, 0)
             W.rows[ROLLING_STEPS, s, 0], W.rows[ROLLING_STEPS, s, 1] = (
                 (1.0, 1.0) if unit_metric else (steps[0], steps[6])
             )
@@ -405,7 +405,7 @@ def begin_iterations(P, X, W, O, unit_metric):
 @formula
 def load_visit(P, X, W, many, at):
     """Load impulses and b of visit ``at``."""
-    i, j, c, v = W.sides[at, 0], W.sides[at, 1], W.sides[at, 2], W.free
+    i, j, c, v = W.contact_nodes[at, 0], W.contact_nodes[at, 1], W.contact_nodes[at, 2], W.free
     if at < many[SPHERE]:
         a, b, d, n = W.spheres.normal[at, 0], W.spheres.normal[at, 1], W.spheres.normal[at, 2], W.spheres.impulse[at]
         set_vector(
@@ -439,12 +439,12 @@ def load_visit(P, X, W, many, at):
 
 @formula
 def subtract_free_velocities(P, X, W, O):
-    """Leave only the velocities caused by impulses in W.own and X.wide."""
+    """Leave only the velocities caused by impulses in W.node_state and X.wide."""
     first, last = node_range(P, O)
     for e in range(first, last):
         i = P.member[e]
         for k in range(6):
-            W.own[i, k] -= W.free[i, k]
+            W.node_state[i, k] -= W.free[i, k]
     for k in range(X.wide.shape[0]):
         X.wide[k] -= W.free_wide[k]
 
@@ -455,26 +455,26 @@ def report_iterate(P, X, W, O, many, best, used, last):
     first, end = node_range(P, O)
     for e in range(first, end):
         for k in range(6):
-            W.own[P.member[e], k] = W.free[P.member[e], k]
+            W.node_state[P.member[e], k] = W.free[P.member[e], k]
     for k in range(X.wide.shape[0]):
         X.wide[k] = W.free_wide[k]
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
-        c, x, y, z = W.sides[s, 2], W.rows[best, s, 0], W.rows[best, s, 1], W.rows[best, s, 2]
+        c, x, y, z = W.contact_nodes[s, 2], W.rows[best, s, 0], W.rows[best, s, 1], W.rows[best, s, 2]
         for k in range(3):
             X.p[c, k] = W.rows[best, s, k]
             if s < many[SPHERE]:
                 X.p[c, k] = P.frame[c, 3 * k] * x + P.frame[c, 3 * k + 1] * y + P.frame[c, 3 * k + 2] * z
-        apply_contact_impulse(P, W.own, X.wide, c, (X.p[c, 0], X.p[c, 1], X.p[c, 2]))
+        apply_contact_impulse(P, W.node_state, X.wide, c, (X.p[c, 0], X.p[c, 1], X.p[c, 2]))
         if P.turn.shape[0] > 0:
             for k in range(3):
                 X.torque[c, k] = W.rows[TORQUE_OFFSET + best, s, k]
-            apply_torque_impulse(P, W.own, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+            apply_torque_impulse(P, W.node_state, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
     first, end = line_range(P, O)
     for k in range(first, end):
         X.line[k] = W.lines[best, k]
         apply_line_impulse(P, X.wide, k, X.line[k])
     O.count.used = used
-    finish_solve(P, X, W, O, residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide)), used, last)
+    finish_solve(P, X, W, O, residuals(P, X, O, (W.node_state, X.wide, W.free, W.free_wide)), used, last)
 
 
 @formula

@@ -68,7 +68,7 @@ def split_masses(P, W, O, many):
     """Shorten the steps of all contacts and lines by the counts."""
     count_contacts(P, W, O)
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
-        n = most_contacts_of_side(P, W, W.sides[s, 2])
+        n = most_contacts_of_side(P, W, W.contact_nodes[s, 2])
         if s < many[SPHERE]:
             W.spheres.inverse_normal[s] /= n
             W.spheres.inverse_tangential[s] /= n

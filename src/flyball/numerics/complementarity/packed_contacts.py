@@ -33,15 +33,15 @@ def copy_nodes(P, X, W, nodes):
     for e in range(nodes[0], nodes[1]):
         i = P.member[e]
         for k in range(6):
-            W.own[i, k] = X.v[i, k]
+            W.node_state[i, k] = X.v[i, k]
             W.free[i, k] = X.v[i, k]
             W.inner[i, k] = P.node.inverse_inertia[i, k]
-        W.own[i, INVERSE_MASS_COLUMN] = P.node.inverse_mass[i]
-        W.own[i, MEAN_INERTIA_COLUMN] = (
+        W.node_state[i, INVERSE_MASS_COLUMN] = P.node.inverse_mass[i]
+        W.node_state[i, MEAN_INERTIA_COLUMN] = (
             P.node.inverse_inertia[i, 0] + P.node.inverse_inertia[i, 1] + P.node.inverse_inertia[i, 2]
         ) / 3.0
     for k in range(8):
-        W.own[P.size[1], k], W.inner[P.size[1], k], W.free[P.size[1], k] = 0.0, 0.0, 0.0
+        W.node_state[P.size[1], k], W.inner[P.size[1], k], W.free[P.size[1], k] = 0.0, 0.0, 0.0
 
 
 @formula
@@ -203,7 +203,7 @@ def count_contact_kinds(P, W, first, last, friction_level):
 
 @formula
 def pack_contacts(P, X, W, coulomb, first, many):
-    """Pack contacts in visiting order, and apply their impulses to the velocities in W.own and X.wide."""
+    """Pack contacts in visiting order, and apply their impulses to the velocities in W.node_state and X.wide."""
     begin = 0  # first visit of a kind
     last = first + many[0] + many[1] + many[2] + many[3] + many[4]
     for kind in range(CONTACT_KINDS):
@@ -237,14 +237,14 @@ def pack_contact(P, X, W, coulomb, c, kind, place):
     """Pack one contact, and apply its impulse."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
-    W.sides[place, 0], W.sides[place, 1], W.sides[place, 2] = i, j, c
+    W.contact_nodes[place, 0], W.contact_nodes[place, 1], W.contact_nodes[place, 2] = i, j, c
     make_admissible(P, X, c)
     if kind == SMOOTH_SPHERE or kind == SPHERE:
         pack_sphere(P, X, W, c, place)
         if W.spheres.impulse[place] != 0.0:
             apply_sphere_impulse(
                 W.spheres,
-                W.own,
+                W.node_state,
                 i,
                 j,
                 place,
@@ -266,9 +266,9 @@ def pack_contact(P, X, W, coulomb, c, kind, place):
         for s in range(3):
             W.frictional.impulse[place, s] = p[s]
     if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
-        apply_contact_impulse(P, W.own, X.wide, c, p)
+        apply_contact_impulse(P, W.node_state, X.wide, c, p)
     if P.turn.shape[0] > 0:
-        apply_torque_impulse(P, W.own, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+        apply_torque_impulse(P, W.node_state, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
 
 
 @formula

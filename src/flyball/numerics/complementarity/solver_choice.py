@@ -45,8 +45,8 @@ MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, 
 NEWTON_TOLERANCE_FACTOR = 1e-5  # residual of Newton's method, relative to the one requested
 UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island above which sweeps converge too slowly
 CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # limits of a small island in a crowd
-# entries of IslandSolver.told, summed over calls: calls, islands, islands by the small-island solver and by the other,
-# islands passed on from the former to the latter, contacts by the former; contacts of the largest island
+# entries of IslandSolver.statistics, summed over calls: calls, islands, islands by the small-island solver and by the
+# other, islands passed on from the former to the latter, contacts by the former; contacts of the largest island
 CALLS, ISLANDS, SMALL_SOLVED, OTHER_SOLVED, PASSED_ON, SMALL_CONTACTS, LARGEST_ISLAND, STATISTICS = range(8)
 
 
@@ -61,7 +61,7 @@ class IslandSolver(NamedTuple):
     pick: Int1  # (ni,): islands, small ones first
     doors: Int1
     limit: Int1
-    told: Int1
+    statistics: Int1
 
 
 @formula
@@ -131,20 +131,20 @@ def pick_islands(P, F, I, count):
     """Order the islands in ``F.pick``, small ones first; returns the number of small ones."""
     some = 0
     for k in range(count):
-        F.told[LARGEST_ISLAND] = max(F.told[LARGEST_ISLAND], I.island[k + 1] - I.island[k])
+        F.statistics[LARGEST_ISLAND] = max(F.statistics[LARGEST_ISLAND], I.island[k + 1] - I.island[k])
         if F.doors[SMALL_ISLAND_SOLVER] != 0 and is_small_island(P, F, I, k):
             F.pick[some] = k
             some += 1
-            F.told[SMALL_CONTACTS] += I.island[k + 1] - I.island[k]
+            F.statistics[SMALL_CONTACTS] += I.island[k + 1] - I.island[k]
     rest = some
     for k in range(count):
         if F.doors[SMALL_ISLAND_SOLVER] == 0 or not is_small_island(P, F, I, k):
             F.pick[rest] = k
             rest += 1
-    F.told[CALLS] += 1
-    F.told[ISLANDS] += count
-    F.told[SMALL_SOLVED] += some
-    F.told[OTHER_SOLVED] += count - some
+    F.statistics[CALLS] += 1
+    F.statistics[ISLANDS] += count
+    F.statistics[SMALL_SOLVED] += some
+    F.statistics[OTHER_SOLVED] += count - some
     return some
 
 
@@ -211,7 +211,7 @@ def solve_small_island(P, X, W, O, F, f):
     if (O.count.ended == LIMIT_REACHED or O.count.ended == STALLED) and O.real.residual <= enough:
         O.count.ended = CONVERGED
     if F.doors[OTHER_SOLVER] != 0 and (O.count.ended == STORAGE_TOO_SMALL or O.count.ended == SOLVE_FAILED):
-        F.told[PASSED_ON] += 1
+        F.statistics[PASSED_ON] += 1
         call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
 
 
@@ -299,7 +299,7 @@ class PreparedSolver(NamedTuple):
 
     kernel: Kernel
     F: IslandSolver
-    told: np.ndarray  # statistics, see `STATISTICS`; empty for a solver that handles all islands at once
+    statistics: np.ndarray  # statistics, see `STATISTICS`; empty for a solver that handles all islands at once
 
 
 def solver_names() -> tuple[str, ...]:
@@ -341,7 +341,7 @@ def prepare_solver(
         made.limit[:] = unlimited_islands(P)  # few bodies: nothing is left for sweeps
     else:
         made.doors[OTHER_SOLVER] = gauss_seidel.address
-    return PreparedSolver(auto, made, made.told)
+    return PreparedSolver(auto, made, made.statistics)
 
 
 def newton_suffices(nodes: int, groups: int, turning: bool) -> bool:

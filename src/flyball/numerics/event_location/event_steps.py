@@ -89,7 +89,7 @@ def end_on_first_event(callbacks, S, W, R, c):
         W.fired[i] = 0
     W.real.same = SIMULTANEOUS_FRACTION * h + 8.0 * ULP * (abs(c.real.t) + h)
     compare_predictions(look, S, W, c.real.t, h, c.real.span)
-    if W.count.plain == 0 and W.count.fresh == 1 and W.count.cuts < MAX_START_CUTS and begins_at_zero(W):
+    if W.count.predictions_agree == 0 and W.count.fresh == 1 and W.count.cuts < MAX_START_CUTS and begins_at_zero(W):
         return STEP_CUT, 0.25 * h, False
     for _ in range(MAX_EARLIER_EVENTS):
         status, i, x, s = find_next_event(callbacks, S, W, R, c, h)
@@ -104,7 +104,7 @@ def end_on_first_event(callbacks, S, W, R, c):
             continue
         for j in range(W.fired.shape[0]):
             W.fired[j] = 0
-        if W.count.leaves_kept_side == 1:
+        if W.count.leaves_required_side == 1:
             status = retake_step(callbacks, S, W, R, c, x * h)
         else:
             slope = predicted_slope(callbacks, S, W, R, c, h, x, i)
@@ -119,7 +119,7 @@ def end_on_first_event(callbacks, S, W, R, c):
         hit = True
         compare_predictions(look, S, W, c.real.t, h, c.real.span)
         W.fired[i] = 1
-        if W.count.leaves_kept_side == 1:
+        if W.count.leaves_required_side == 1:
             break
         mark_simultaneous(callbacks, S, W, R, c, h, i)
     if not hit and h == c.real.t_end - c.real.t:
@@ -144,7 +144,7 @@ def find_next_event(callbacks, S, W, R, c, h):
     """Find the first place where a guard leaves its side: (status, guard or -1, place, side)."""
     W.real.searched_to = 1.0
     i, a, b, at = find_start_sides(callbacks, S, W, R, c, h)
-    if i >= 0 and W.count.leaves_kept_side == 1:
+    if i >= 0 and W.count.leaves_required_side == 1:
         return bisect_violation(callbacks, S, W, R, c, h, i, b, allowed_depth(W, i))
     if i < 0:
         i, a, b = find_crossing_interval(callbacks, S, W, R, c, h, at)
@@ -182,26 +182,26 @@ def find_missed_crossing(callbacks, S, W, R, c, h):
         if W.fired[i] == 1 or not W.g[START_VALUES, i] == W.g[START_VALUES, i]:
             continue
         if W.g[ZERO_BANDS, i] < 0.0 and s * f < -crossing_floor(W, i, 1.0) and triggers(W.way[i], s):
-            W.count.leaves_kept_side = 0
+            W.count.leaves_required_side = 0
             status, x = locate_crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
-        elif (W.kept[i] == 1 and f < -allowed_depth(W, i)) or f < -W.g[CORNER_DEPTHS, i]:
+        elif (W.nonnegative[i] == 1 and f < -allowed_depth(W, i)) or f < -W.g[CORNER_DEPTHS, i]:
             W.real.beyond = 0.0
-            least = allowed_depth(W, i) if W.kept[i] == 1 else W.g[CORNER_DEPTHS, i]
+            least = allowed_depth(W, i) if W.nonnegative[i] == 1 else W.g[CORNER_DEPTHS, i]
             status, _, x, s = bisect_violation(callbacks, S, W, R, c, h, i, 1.0, least)
         else:
             continue
         if status != 0:
             return EVALUATION_FAILED, -1, 0.0, 0.0
         if 0.0 < x < at:
-            best, at, side, away = i, x, s, W.count.leaves_kept_side
-    W.count.leaves_kept_side = away
+            best, at, side, away = i, x, s, W.count.leaves_required_side
+    W.count.leaves_required_side = away
     return 0, best, at, side
 
 
 @formula
 def bisect_violation(callbacks, S, W, R, c, h, i, b, least):
     """Find by bisection where guard i, negative at b, passes the rounding depth; returned as by `find_next_event`."""
-    W.count.leaves_kept_side = 1
+    W.count.leaves_required_side = 1
     a = 0.0
     for _ in range(MAX_BISECTIONS):
         x = 0.5 * (a + b)
@@ -226,7 +226,7 @@ def update_sides(callbacks, S, W, R, c, h, a, x):
     best, at, side = -1, 2.0, 0.0
     for i in range(W.way.shape[0]):
         f, s = W.g[PREDICTED_VALUES, i], W.g[SIDES, i]
-        if W.fired[i] == 1 or (W.kept[i] == 1 and f <= 0.0 and W.g[ZERO_BANDS, i] >= 0.0):
+        if W.fired[i] == 1 or (W.nonnegative[i] == 1 and f <= 0.0 and W.g[ZERO_BANDS, i] >= 0.0):
             continue
         if s * f < -crossing_floor(W, i, x) and triggers(W.way[i], s):
             status, z = locate_crossing(callbacks, S, W, R, c, h, i, a, x, s)
@@ -270,7 +270,7 @@ def end_slopes(callbacks, S, W, R, c, h):
             if W.g[END_SLOPES, i] != 0.0:
                 continue
             change = W.g[END_VALUES, i] - (W.g[PREDICTED_VALUES, i] if back < 1.0 else W.g[START_VALUES, i])
-            if W.kept[i] == 1 or not abs(change) <= 2.0 * crossing_floor(W, i, 1.0):
+            if W.nonnegative[i] == 1 or not abs(change) <= 2.0 * crossing_floor(W, i, 1.0):
                 W.g[END_SLOPES, i] = change / (back * h)
             elif change != 0.0:
                 asked = True
@@ -300,7 +300,7 @@ def mark_at_final_time(callbacks, S, W, R, c, h):
     end_slopes(callbacks, S, W, R, c, h)
     for i in range(W.way.shape[0]):
         f, s, slope = W.g[END_VALUES, i], W.g[SIDES, i], W.g[END_SLOPES, i]
-        if W.kept[i] == 1 or not f - f == 0.0:
+        if W.nonnegative[i] == 1 or not f - f == 0.0:
             continue
         if triggers(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding_floor_with_time(W, c, i, slope, 1.0):
             W.fired[i] = 1
@@ -401,9 +401,9 @@ def set_sides_after_event(W, c, h):
                 abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i])
             ):  # it did not jump
                 nothing = max(nothing, ROUNDING_FACTOR * abs(f))
-        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
+        elif W.nonnegative[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
-        elif W.kept[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to cross, but has not yet
+        elif W.nonnegative[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to cross, but has not yet
             W.side[i] = s if s != 0.0 else UNKNOWN_SIDE
         W.g[ZERO_BANDS, i] = nothing
 
@@ -413,7 +413,9 @@ def shift_guards_to_start(W):
     """Make the guards at the end of the step those at the start of the next."""
     W.count.fresh = 0
     for i in range(W.way.shape[0]):
-        W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END_VALUES, i]) <= ROUNDING_FACTOR * W.grain[i] else W.g[SIDES, i]
+        W.side[i] = (
+            0.0 if W.nonnegative[i] == 1 and abs(W.g[END_VALUES, i]) <= ROUNDING_FACTOR * W.grain[i] else W.g[SIDES, i]
+        )
         W.g[START_VALUES, i], W.g[START_ROUNDING, i] = W.g[END_VALUES, i], W.g[END_ROUNDING, i]
     for i in range(W.way.shape[0], W.way.shape[0] + W.count.terms):
         W.g[START_VALUES, i] = W.g[END_VALUES, i]

@@ -88,12 +88,12 @@ class GuardCounts(Record, kind="Int"):
     looks: int  # places evaluated
     again: int  # steps repeated
     events: int
-    plain: int  # whether the predictions within the step are confirmed
+    predictions_agree: int  # whether the predictions within the step are confirmed
     exact_looks: int  # places evaluated with the equations in this step
     all_exact_looks: int  # the same in total
     lost: int  # whether the equations could not be evaluated at a place
     cuts: int  # times that a step was cut because it could not be searched completely
-    leaves_kept_side: int  # whether a guard leaves the side on which it must stay
+    leaves_required_side: int  # whether a guard leaves the side on which it must stay
     terms: int  # number of terms of the last guard, that of a group of contact forces
     short_step: int  # whether the step is so short that rates are more accurate than differences of values
 
@@ -102,7 +102,7 @@ class GuardState(NamedTuple):
     """Workspace of event detection, besides the StepState."""
 
     way: Int1  # (ng,): direction of sign changes that are events
-    kept: Int1  # (ng,): 1 for guards that the active constraints keep above zero
+    nonnegative: Int1  # (ng,): 1 for guards that the active constraints keep above zero
     no_deeper: Int1  # (ng,): 1 for guards that rounding does not take farther below zero than they begin
     grain: Float1  # (ng,): rounding error of the guard; if it may have either sign, the smaller one of both ends
     least: Float1  # (ng,): rounding error of a force, for guards of forces; else 0
@@ -221,7 +221,7 @@ def allocate_guard_state(
     g[START_ROUNDING : END_ROUNDING + 1] = 0.0
     return GuardState(
         way=np.array(way, np.int64),
-        kept=(np.asarray(holding) > 0).astype(np.int64),
+        nonnegative=(np.asarray(holding) > 0).astype(np.int64),
         no_deeper=(np.asarray(holding) > 1).astype(np.int64),
         grain=np.zeros(ng),
         least=np.zeros(ng),
@@ -368,7 +368,7 @@ def crossing_floor(W, i, x):
 @formula
 def rounding_floor(W, i, x):
     """Return the rounding error of guard i at a fraction x of the step."""
-    if W.kept[i] == 1 or is_law_corner(W, i):
+    if W.nonnegative[i] == 1 or is_law_corner(W, i):
         return ROUNDING_FACTOR * W.grain[i]
     return W.real.drift * ((1.0 - x) * W.g[START_ROUNDING, i] + x * W.g[END_ROUNDING, i])
 
@@ -455,7 +455,7 @@ SHORT_STEP_FRACTION = 1e-7  # part of the time span; shorter steps contain no ev
 def evaluate_guards(callbacks, S, W, R, c, h, x, row):
     """Write the guards at a fraction x of the step to a row."""
     W.count.looks += 1
-    if W.count.plain == 1:
+    if W.count.predictions_agree == 1:
         callbacks[7](c.real.t, h, x, S, W, row)
     elif evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row) != 0:
         W.count.lost = 1
@@ -487,10 +487,10 @@ def exact_guard(callbacks, S, W, R, c, h, x, i):
 
 @formula
 def compare_predictions(predict, S, W, t, h, span):
-    """Compare predictions with the guards at stages of the step; sets W.count.plain to 1 if they agree."""
+    """Compare predictions with the guards at stages of the step; sets W.count.predictions_agree to 1 if they agree."""
     ng = W.way.shape[0]
     W.count.exact_looks = W.count.lost = 0
-    W.count.plain = 1
+    W.count.predictions_agree = 1
     W.count.short_step = 1 if h <= SHORT_STEP_FRACTION * span else 0
     every = ng + W.count.terms
     for i in range(every):
@@ -504,12 +504,12 @@ def compare_predictions(predict, S, W, t, h, span):
             if f == g or (f != f and g != g):
                 continue
             if not f - g == f - g:  # one is finite, the other is not
-                W.count.plain = 0
+                W.count.predictions_agree = 0
             W.g[LOWEST_VALUES, i] = min(W.g[LOWEST_VALUES, i], f, g)
             W.g[HIGHEST_VALUES, i] = max(W.g[HIGHEST_VALUES, i], f, g)
             W.g[PREDICTION_ERRORS, i] = max(W.g[PREDICTION_ERRORS, i], abs(f - g))
     if W.count.short_step == 1:
-        W.count.plain = 1
+        W.count.predictions_agree = 1
         return
     for i in range(ng):
         low, high, miss = W.g[LOWEST_VALUES, i], W.g[HIGHEST_VALUES, i], W.g[PREDICTION_ERRORS, i]
@@ -519,6 +519,6 @@ def compare_predictions(predict, S, W, t, h, span):
             continue
         if miss < DISTANCE_TOLERANCE * low or miss < -DISTANCE_TOLERANCE * high:
             continue
-        W.count.plain = 0
+        W.count.predictions_agree = 0
     if not terms_confirmed(W):
-        W.count.plain = 0
+        W.count.predictions_agree = 0

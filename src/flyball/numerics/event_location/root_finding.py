@@ -77,7 +77,7 @@ def find_crossing_interval(callbacks, S, W, R, c, h, first):
         smooth = subinterval_resolved(W)
         if not smooth and w > MIN_SUBINTERVAL and W.count.looks < most:
             if (
-                W.count.plain == 0
+                W.count.predictions_agree == 0
                 and W.count.exact_looks > MAX_EXACT_LOOKS
                 and a > MIN_CUT_PLACE
                 and W.count.cuts < MAX_CUTS
@@ -237,7 +237,7 @@ def crossing_of_polynomial(W, i):
                 W.g[SIDES, i] = s
                 return x, y
             s = side_of(f1)
-        elif s == 0.0 and (f1 if W.kept[i] == 1 else abs(f1)) > W.g[ZERO_BANDS, i]:
+        elif s == 0.0 and (f1 if W.nonnegative[i] == 1 else abs(f1)) > W.g[ZERO_BANDS, i]:
             s = side_of(f1)
         d = d1
     W.g[SIDES, i] = s
@@ -259,7 +259,7 @@ def crossing_at_nodes(W, i):
                 W.g[SIDES, i] = s
                 return W.nodes[j - 1], W.nodes[j]
             s = side_of(f)
-        elif s == 0.0 and (f if W.kept[i] == 1 else abs(f)) > W.g[ZERO_BANDS, i]:
+        elif s == 0.0 and (f if W.nonnegative[i] == 1 else abs(f)) > W.g[ZERO_BANDS, i]:
             s = side_of(f)
     W.g[SIDES, i] = s
     return 0.0, -1.0
@@ -298,14 +298,14 @@ def find_start_sides(callbacks, S, W, R, c, h):
 
     A guard about zero at the start of a segment, above all one that has just triggered (side 0), gets the side to which
     it moves. It is evaluated at places near the start, in order of distance, which show the side and an early return. A
-    guard that must stay above zero (W.kept) must not go below; W.count.leaves_kept_side is 1 if it does.
+    guard that must stay above zero (W.nonnegative) must not go below; W.count.leaves_required_side is 1 if it does.
     """
     look, t, ng = callbacks[7], c.real.t, W.way.shape[0]
-    W.count.leaves_kept_side = 0
+    W.count.leaves_required_side = 0
     if W.count.fresh == 0 and not has_doubtful_side(W):
         for i in range(ng):
             W.g[SIDES, i] = W.side[i]
-            W.g[ZERO_BANDS, i] = rounding_floor(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
+            W.g[ZERO_BANDS, i] = rounding_floor(W, i, 0.0) if W.side[i] == 0.0 and W.nonnegative[i] == 0 else -1.0
         return -1, 0.0, 0.0, 0.0
     if not mark_zero_starts(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0
@@ -315,11 +315,11 @@ def find_start_sides(callbacks, S, W, R, c, h):
         look(t, h, x, S, W, PREDICTED_VALUES)
         W.count.looks += 1
         i = leaves_start_side(W, 0)
-        while i >= 0 and W.count.leaves_kept_side == 1:  # check with the equations: interpolation is less accurate
+        while i >= 0 and W.count.leaves_required_side == 1:  # check with the equations: interpolation is less accurate
             status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
             if status != 0 or not f >= -allowed_depth(W, i):
                 break
-            W.count.leaves_kept_side = 0
+            W.count.leaves_required_side = 0
             i = leaves_start_side(W, i + 1)
         if i >= 0:
             return i, before, x, x
@@ -334,7 +334,7 @@ def has_doubtful_side(W):
     """Whether a guard that must stay above zero has been about zero since the start of the segment."""
     n = 0
     for i in range(W.way.shape[0]):
-        if W.kept[i] == 1 and W.side[i] <= 0.0 and W.g[START_VALUES, i] == W.g[START_VALUES, i]:
+        if W.nonnegative[i] == 1 and W.side[i] <= 0.0 and W.g[START_VALUES, i] == W.g[START_VALUES, i]:
             n += 1
     return n > 0
 
@@ -348,17 +348,17 @@ def mark_zero_starts(callbacks, S, W, R, c, h):
     near = False
     for i in range(W.way.shape[0]):
         low, high = value_range(W, i)
-        fresh = W.count.fresh == 1 and (W.kept[i] == 1 or abs(W.side[i]) != 1.0)
+        fresh = W.count.fresh == 1 and (W.nonnegative[i] == 1 or abs(W.side[i]) != 1.0)
         W.g[SIDES, i] = side_of(W.g[START_VALUES, i]) if fresh else W.side[i]
         W.g[ZERO_BANDS, i] = -1.0
-        if not fresh and (W.count.fresh == 1 or not (W.kept[i] == 1 and W.side[i] <= 0.0)):
+        if not fresh and (W.count.fresh == 1 or not (W.nonnegative[i] == 1 and W.side[i] <= 0.0)):
             continue
         size = max(abs(low), abs(high))
         now = abs(W.g[START_VALUES, i])
         just = W.side[i] == 0.0
-        below = W.kept[i] == 1 and W.g[START_VALUES, i] < 0.0
+        below = W.nonnegative[i] == 1 and W.g[START_VALUES, i] < 0.0
         nothing = 0.0
-        if W.kept[i] == 0 and both_finite(low, high):
+        if W.nonnegative[i] == 0 and both_finite(low, high):
             slope = min(high - low, abs(W.g[PREDICTED_VALUES, i] - W.g[START_VALUES, i]) / first) / h
             nothing = max(
                 rounding_floor_with_time(W, c, i, slope, 0.0), ROUNDING_FACTOR * W.g[TRIGGER_VALUES, i] if just else 0.0
@@ -368,7 +368,7 @@ def mark_zero_starts(callbacks, S, W, R, c, h):
         ):
             W.g[SIDES, i] = 0.0
             mark = allowed_depth_factor(W, i) * now if just or below else START_ZERO_TOLERANCE * size
-            W.g[ZERO_BANDS, i] = max(mark, W.kept[i] * ROUNDING_FACTOR * W.grain[i], nothing)
+            W.g[ZERO_BANDS, i] = max(mark, W.nonnegative[i] * ROUNDING_FACTOR * W.grain[i], nothing)
             near = True
     return near
 
@@ -381,8 +381,8 @@ def leaves_start_side(W, first):
         s = W.g[SIDES, i]
         if W.g[ZERO_BANDS, i] < 0.0 or W.fired[i] != 0:
             continue
-        if W.kept[i] == 1 and s <= 0.0 and f < -allowed_depth(W, i):
-            W.count.leaves_kept_side = 1
+        if W.nonnegative[i] == 1 and s <= 0.0 and f < -allowed_depth(W, i):
+            W.count.leaves_required_side = 1
             return i
         if s == 0.0:
             if abs(f) > W.g[ZERO_BANDS, i]:
@@ -399,7 +399,7 @@ def has_undecided_side(W):
     """Whether a guard that begins about zero has no side yet, or must be followed to the end of the search."""
     n = 0
     for i in range(W.way.shape[0]):
-        if W.g[ZERO_BANDS, i] >= 0.0 and (W.g[SIDES, i] == 0.0 or W.kept[i] == 1):
+        if W.g[ZERO_BANDS, i] >= 0.0 and (W.g[SIDES, i] == 0.0 or W.nonnegative[i] == 1):
             n += 1
     return n > 0
 
@@ -453,7 +453,7 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
         status, fa = exact_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
-    if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[ZERO_BANDS, i]:
+    if a <= 0.0 and W.nonnegative[i] == 0 and abs(fa) <= W.g[ZERO_BANDS, i]:
         fa = 0.0  # rounding: on no side
     elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < crossing_floor(W, i, 0.0):
         status, fb = exact_guard(callbacks, S, W, R, c, h, last, i)  # the previous step ended next to it
@@ -468,15 +468,19 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
         return status, -1.0
     if s * fb > 0.0:  # it may return in between
         status, m, fm = find_minimum(callbacks, S, W, R, c, h, i, a, b, s)
-        if status != 0 or s * fm > (0.0 if W.kept[i] == 1 else -crossing_floor(W, i, m)):
+        if status != 0 or s * fm > (0.0 if W.nonnegative[i] == 1 else -crossing_floor(W, i, m)):
             return status, -1.0
         if triggers(W.way[i], s):
             b, fb = m, fm
         else:
             a, fa = m, fm
-    elif W.kept[i] == 0 and s * fb >= -crossing_floor(W, i, b) and not (fb == 0.0 and s * fa > crossing_floor(W, i, a)):
+    elif (
+        W.nonnegative[i] == 0
+        and s * fb >= -crossing_floor(W, i, b)
+        and not (fb == 0.0 and s * fa > crossing_floor(W, i, a))
+    ):
         return 0, -1.0  # it reaches zero without passing it
-    begun = W.kept[i] == 0 and abs(W.g[START_VALUES, i]) <= W.g[ZERO_BANDS, i]  # about zero, on no side
+    begun = W.nonnegative[i] == 0 and abs(W.g[START_VALUES, i]) <= W.g[ZERO_BANDS, i]  # about zero, on no side
     if a > 0.0 and (begun or W.g[START_VALUES, i] * fa < 0.0):
         W.real.beyond = a
     W.real.bracket = b - a

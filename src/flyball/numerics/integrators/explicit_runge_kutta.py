@@ -324,9 +324,9 @@ def accept_explicit_step(R, c, t, h, error):
         c.y.previous_rate[i] = c.K[0, i]
         c.y.current[i] = c.y.proposed[i]
         c.K[0, i] = c.K[R.order_i[1], i]
-    for i in range(c.seen.shape[1]):
-        c.seen[INSPECTED_START, i] = c.seen[INSPECTED_END, i]
-        c.seen[INSPECTED_START_RATE, i] = c.seen[INSPECTED_END_RATE, i]
+    for i in range(c.inspection.shape[1]):
+        c.inspection[INSPECTED_START, i] = c.inspection[INSPECTED_END, i]
+        c.inspection[INSPECTED_START_RATE, i] = c.inspection[INSPECTED_END_RATE, i]
     c.real.before = c.real.t
     if error > c.real.largest_error:
         c.real.largest_error = error
@@ -428,7 +428,7 @@ def begin_explicit(derivative, inspect, S, W, R, c):
     """Compute the first derivative and the first step width. Returns a status."""
     if derivative(c.real.t, c.y.current, c.K[0], S, W) != 0:
         return STEP_FAILED
-    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, W)
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.inspection, S, W)
     for i in range(c.y.shape[1]):
         if not c.K[0, i] - c.K[0, i] == 0.0:
             return NOT_FINITE
@@ -497,8 +497,8 @@ def missed_change(derivative, inspect, S, W, R, c):
     than a step, the formula has switched to another branch and every width fails. Steps of fixed width only check that.
     """
     h = c.real.tried
-    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, W)
-    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, W)
+    inspect(c.real.t, h, c.real.span, AT_END, c.inspection, S, W)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.inspection, S, W)
     if k > 0 and c.count.extended == 0:
         if evaluate_dense_stages(derivative, S, W, R, c, h) != 0:
             return 1
@@ -508,7 +508,7 @@ def missed_change(derivative, inspect, S, W, R, c):
             return 1
         if c.real.step == 0.0 and not equation_defect(derivative, S, W, R, c, h, x) * share <= 1.0:
             return 1
-        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, W)
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.inspection, S, W)
     return 0
 
 
@@ -531,7 +531,7 @@ def run_explicit_task(functions, S, W, R, c, task):
     if task == CHECK_MISSED_CHANGE:
         return missed_change(derivative, inspect, S, W, R, c)
     if task == INSPECT_END:
-        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, W)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.inspection, S, W)
         return 0
     if task == BEGIN_SEGMENT:
         return begin_explicit(derivative, inspect, S, W, R, c)

@@ -126,12 +126,12 @@ def factor_alpha_matrix(K, h):
     for i in range(A.shape[0]):
         A[i] = 0.0
     for e in range(K.part[0]):
-        A[K.put[e, 0]] += J[K.put[e, 1]]
+        A[K.scatter[e, 0]] += J[K.scatter[e, 1]]
     for e in range(K.part[0], K.part[1]):
         by = gamma / (beta * h) if e - K.part[0] < K.v.shape[1] else scale
-        A[K.put[e, 0]] += by * J[K.put[e, 1]]
-    for e in range(K.part[1], K.put.shape[0]):
-        A[K.put[e, 0]] += J[K.put[e, 1]] / scale
+        A[K.scatter[e, 0]] += by * J[K.scatter[e, 1]]
+    for e in range(K.part[1], K.scatter.shape[0]):
+        A[K.scatter[e, 0]] += J[K.scatter[e, 1]] / scale
     K.count.factors += 1
     K.real.width = h
     status = lu_factor(K.P, A, K.real_L, K.real_U, K.real_D, K.real_Y)

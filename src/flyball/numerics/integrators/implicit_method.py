@@ -159,7 +159,7 @@ def begin_implicit(arrive, inspect, S, K, c):
         c.y.current[i] = y[i]
         if not c.K[0, i] - c.K[0, i] == 0.0:
             return NOT_FINITE
-    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, K)
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.inspection, S, K)
     for i in range(K.found.shape[0]):
         K.lam[STEP_START, i] = K.found[i]
     K.count.before = 0
@@ -183,14 +183,14 @@ def begin_implicit(arrive, inspect, S, K, c):
 def missed_implicit_change(residual, inspect, S, K, c):
     """Whether laws change within the step without being seen at its stages; as `explicit_runge_kutta.missed_change`."""
     h = c.real.tried
-    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, K)
-    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, K)
+    inspect(c.real.t, h, c.real.span, AT_END, c.inspection, S, K)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.inspection, S, K)
     while k > 0:
         if share > 1.0:
             return 1
         if c.real.step == 0.0 and not radau_defect(residual, S, K, c, h, x) * share <= 1.0:
             return 1
-        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, K)
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.inspection, S, K)
     return 0
 
 
@@ -220,20 +220,20 @@ def run_implicit_task(method, callbacks, S, K, c, task):
     residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
     if task == TRY_STEP:
         c.count.extended = 0
-        status, c.real.error, K.real.asked = attempt(callbacks, S, K, c, c.real.tried)
+        status, c.real.error, K.real.result = attempt(callbacks, S, K, c, c.real.tried)
         return status
     if task == INTERPOLATE:
         return interpolate_implicit(between, compose, S, K, c)
     if task == ACCEPT_STEP:
         c.real.before = c.real.t
-        enter(K, c, step_end_time(c), c.real.tried, c.real.error, K.real.asked)
+        enter(K, c, step_end_time(c), c.real.tried, c.real.error, K.real.result)
         return 0
     if task == REJECT_STEP:
         return refuse(K, c)
     if task == CHECK_MISSED_CHANGE:
         return missed_implicit_change(residual, inspect, S, K, c)
     if task == INSPECT_END:
-        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, K)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.inspection, S, K)
         return 0
     if task == BEGIN_SEGMENT:
         return begin_implicit(arrive, inspect, S, K, c)

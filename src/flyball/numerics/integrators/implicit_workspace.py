@@ -45,7 +45,7 @@ class ImplicitReals(Record, kind="Float"):
     width: float  # width for which the matrices are factored
     last_h: float  # width and error of the previous step
     last_error: float
-    asked: float  # result of the last step: number of iterations, or factor for its width
+    result: float  # result of the last step: number of iterations, or factor for its width
     soft: float  # regularisation
     rounding_size: float  # size of corrections that count as rounding once they stop decreasing
     reuse_rate: float  # contraction ratio up to which a Jacobian is reused
@@ -80,8 +80,8 @@ class RadauStepWorkspace(NamedTuple):
     w: Complex2  # (3, n), complex
     J: Float2  # (4, n): entries of the Jacobian at the stages and at the start of the step; the first is 1
     spring: Int2  # (entries, 5): equation and velocity; entries of the Jacobian by increment, rate, velocity
-    put: Int2  # (entries, 2): place in the matrix, entry of the Jacobian: with factor 1, h-scale, its inverse
-    part: Int1  # (2,): ends of the first two groups of `put`
+    scatter: Int2  # (entries, 2): place in the matrix, entry of the Jacobian: with factor 1, h-scale, its inverse
+    part: Int1  # (2,): ends of the first two groups of `scatter`
     real_A: Float1  # the real matrix and its factors
     real_L: Float1
     real_U: Float1
@@ -93,7 +93,7 @@ class RadauStepWorkspace(NamedTuple):
     pair_D: Complex1
     pair_Y: Complex1
     P: LUPattern
-    whole_put: Int2  # (entries, 4): place in the matrix of all stages, row of J, entry, multiplier
+    whole_scatter: Int2  # (entries, 4): place in the matrix of all stages, row of J, entry, multiplier
     whole_x: Float2  # (3, 3 n)
     whole_A: Float1
     whole_L: Float1
@@ -126,7 +126,7 @@ class AlphaStepWorkspace(NamedTuple):
     x: Float2
     J: Float2
     spring: Int2
-    put: Int2
+    scatter: Int2
     part: Int1
     real_A: Float1
     real_L: Float1

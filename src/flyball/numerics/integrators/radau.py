@@ -48,7 +48,7 @@ from .time_loop import (
 MAX_COUPLED_ITERATIONS = 12
 COUPLED_REFINEMENTS = 6  # refinements of each solve
 MAX_COUPLED_GROWTH = 10.0  # largest ratio of successive corrections
-UNSCALED, REGULARISATION = -1, -2  # multiplier codes in `whole_put`, besides columns of A^-1 / h
+UNSCALED, REGULARISATION = -1, -2  # multiplier codes in `whole_scatter`, besides columns of A^-1 / h
 
 
 @formula
@@ -57,14 +57,14 @@ def fill_coupled_matrix(K, h):
     A = K.whole_A
     for i in range(A.shape[0]):
         A[i] = 0.0
-    for e in range(K.whole_put.shape[0]):
-        x = K.J[K.whole_put[e, 1], K.whole_put[e, 2]]
-        by = K.whole_put[e, 3]
+    for e in range(K.whole_scatter.shape[0]):
+        x = K.J[K.whole_scatter[e, 1], K.whole_scatter[e, 2]]
+        by = K.whole_scatter[e, 3]
         if by >= 0:
-            x *= RADAU_A_INVERSE[K.whole_put[e, 1]][by] / h
+            x *= RADAU_A_INVERSE[K.whole_scatter[e, 1]][by] / h
         elif by == REGULARISATION:
             x *= h / GAMMA
-        A[K.whole_put[e, 0]] += x
+        A[K.whole_scatter[e, 0]] += x
 
 
 @formula
@@ -77,10 +77,10 @@ def solve_coupled(K, h):
     lu_solve(K.whole_P, K.whole_L, K.whole_U, K.whole_D, x[0])
     for _ in range(COUPLED_REFINEMENTS if K.count.shared == 0 else 0):
         sparse_product(K.whole_P, K.whole_A, x[0], x[2])
-        for e in range(K.whole_put.shape[0]):
-            if K.whole_put[e, 3] == REGULARISATION:
-                i = K.whole_P.Aj[K.whole_put[e, 0]]
-                x[2, i] -= h / GAMMA * K.J[K.whole_put[e, 1], K.whole_put[e, 2]] * x[0, i]
+        for e in range(K.whole_scatter.shape[0]):
+            if K.whole_scatter[e, 3] == REGULARISATION:
+                i = K.whole_P.Aj[K.whole_scatter[e, 0]]
+                x[2, i] -= h / GAMMA * K.J[K.whole_scatter[e, 1], K.whole_scatter[e, 2]] * x[0, i]
         for i in range(n):
             x[2, i] = x[1, i] - x[2, i]
         lu_solve(K.whole_P, K.whole_L, K.whole_U, K.whole_D, x[2])
@@ -252,7 +252,7 @@ def width_for_error(h, error, iterations):
 @formula
 def reject_radau_step(K, c):
     """Choose a narrower step, with a new Jacobian at its start. Returns 0, or 1 if there is none to try."""
-    h, error, asked = c.real.tried, c.real.error, K.real.asked
+    h, error, asked = c.real.tried, c.real.error, K.real.result
     if K.count.shared == 0 and (c.count.step_status != 0 or c.real.max_growth <= 1.0):
         K.count.refine = RETRY_REFINEMENTS
     if c.count.step_status != 0:
@@ -345,9 +345,9 @@ def accept_radau_step(K, c, t, h, error, iterations):
     if c.real.accepted_error > 0.0:
         wide = max(h, c.real.wide)
     reset_rejections(c)
-    for i in range(c.seen.shape[1]):
-        c.seen[INSPECTED_START, i] = c.seen[INSPECTED_END, i]
-        c.seen[INSPECTED_START_RATE, i] = c.seen[INSPECTED_END_RATE, i]
+    for i in range(c.inspection.shape[1]):
+        c.inspection[INSPECTED_START, i] = c.inspection[INSPECTED_END, i]
+        c.inspection[INSPECTED_START_RATE, i] = c.inspection[INSPECTED_END_RATE, i]
     K.real.last_h = h
     K.real.last_error = max(1e-2, error)
     K.count.before = 1

@@ -84,12 +84,12 @@ def fill_matrix(K, A, scale):
     for i in range(A.shape[0]):
         A[i] = 0.0
     for e in range(K.part[0]):
-        A[K.put[e, 0]] += J[K.put[e, 1]]
+        A[K.scatter[e, 0]] += J[K.scatter[e, 1]]
     for e in range(K.part[0], K.part[1]):
-        A[K.put[e, 0]] += scale * J[K.put[e, 1]]
+        A[K.scatter[e, 0]] += scale * J[K.scatter[e, 1]]
     back = 1.0 / scale
-    for e in range(K.part[1], K.put.shape[0]):
-        A[K.put[e, 0]] += back * J[K.put[e, 1]]
+    for e in range(K.part[1], K.scatter.shape[0]):
+        A[K.scatter[e, 0]] += back * J[K.scatter[e, 1]]
 
 
 @formula
@@ -118,9 +118,9 @@ def solve_refined(K, x, A, L, U, D, scale):
     J = K.J[STEP_START]
     for _ in range(K.count.refine):
         sparse_product(K.P, A, x[0], x[2])
-        for e in range(K.part[1], K.put.shape[0]):  # regularisation is on the diagonal only
-            i = K.P.Aj[K.put[e, 0]]
-            x[2, i] -= back * J[K.put[e, 1]] * x[0, i]
+        for e in range(K.part[1], K.scatter.shape[0]):  # regularisation is on the diagonal only
+            i = K.P.Aj[K.scatter[e, 0]]
+            x[2, i] -= back * J[K.scatter[e, 1]] * x[0, i]
         for i in range(n):
             x[2, i] = x[1, i] - x[2, i]
         lu_solve(K.P, L, U, D, x[2])

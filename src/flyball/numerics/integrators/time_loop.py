@@ -21,7 +21,7 @@ from ...compiler.struct_layout import Float1, Float2, Int1, Record
 
 # StepCounts.started if no segment has begun, but only forces have jumped at its start
 FORCES_JUMPED = 2
-# rows of StepState.seen that the integrator uses: data of inspected laws at the start and the end of a step
+# rows of StepState.inspection that the integrator uses: data of inspected laws at the start and the end of a step
 INSPECTED_START, INSPECTED_START_RATE, INSPECTED_END, INSPECTED_END_RATE = range(1, 5)
 AT_START, AT_END = -2, -1  # tasks of ``inspect``: store data of the start or end, instead of checking law k
 INTEGRAL_TOLERANCE_FACTOR = 10.0  # the tolerance of integrals is this many times the relative tolerance
@@ -101,7 +101,7 @@ class StepState(NamedTuple):
     y: StateVectors
     K: Float2  # (stages + 1, ny): derivatives of the stages, and one within the step
     integrals: Int1  # components that are integrals over the motion, such as work
-    seen: Float2 = NO_INSPECTION  # data of inspected laws within a step; no columns: no inspection
+    inspection: Float2 = NO_INSPECTION  # data of inspected laws within a step; no columns: no inspection
 
 
 # tasks of a method: start at the current state (returns a status of the loop); try a step of width c.real.tried to
@@ -213,7 +213,7 @@ def finish_step(callbacks, S, W, R, c, out, used):
     """Complete an accepted step. Returns (rows written, whether the loop returns)."""
     ask, own = callbacks[:2]
     h = c.real.tried
-    if c.seen.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
+    if c.inspection.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
         shorten_step(c, 0.5 * h)
         return used, False
     status, used = write_output(callbacks, S, W, R, c, out, used)

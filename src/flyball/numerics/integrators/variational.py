@@ -234,7 +234,7 @@ def run_variational_task(callbacks, S, K, c, task):
     if task == REJECT_STEP:
         return 1
     if task == CHECK_MISSED_CHANGE or task == INSPECT_END:
-        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, K)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.inspection, S, K)
         return 0
     if task == BEGIN_SEGMENT:
         return begin_implicit(arrive, inspect, S, K, c)

@@ -147,8 +147,8 @@ CHECKS_PER_STEP = NODES - 1 + CHECK_NODES  # least number of points of a step at
 
 def guard_check_remark(loop: GuardedLoop) -> str:
     """Return the health remark on the number of points at which guards were evaluated."""
-    count = loop.desk.count
-    guards, steps = len(loop.desk.way), max(int(count.steps), 1)
+    count = loop.guard_state.count
+    guards, steps = len(loop.guard_state.way), max(int(count.steps), 1)
     what = "1 event function" if guards == 1 else f"{guards} event functions"
     most = max(count.looks / steps + 1, CHECKS_PER_STEP)  # plus the end of the step
     return (
@@ -159,23 +159,25 @@ def guard_check_remark(loop: GuardedLoop) -> str:
 
 def note_fired_zeros(here: EventContext, loop: GuardedLoop) -> None:
     """Store the rounding of event expressions where a step ended on events, and the values of those that triggered."""
-    events, desk = here.structure.events, loop.desk
-    here.nothing = {g: float(desk.g[ZERO_BANDS, g]) for g in events}
-    here.zero |= {events[g].name: float(desk.g[TRIGGER_VALUES, g]) for g in loop.fired if g in events}
+    events, guard_state = here.structure.events, loop.guard_state
+    here.nothing = {g: float(guard_state.g[ZERO_BANDS, g]) for g in events}
+    here.zero |= {events[g].name: float(guard_state.g[TRIGGER_VALUES, g]) for g in loop.fired if g in events}
 
 
 def note_rounding_zeros(here: EventContext, loop: GuardedLoop) -> None:
     """Store the rounding of event expressions where a step ended at a time at which forces jump."""
-    here.nothing = {g: float(loop.desk.real.drift * loop.desk.g[END_ROUNDING, g]) for g in here.structure.events}
+    here.nothing = {
+        g: float(loop.guard_state.real.drift * loop.guard_state.g[END_ROUNDING, g]) for g in here.structure.events
+    }
 
 
 def save_final_signs(here: EventContext, loop: GuardedLoop) -> None:
     """Store the last signs of event expressions that are zero to rounding at the end of the motion."""
-    desk, here.final_signs = loop.desk, {}
+    guard_state, here.final_signs = loop.guard_state, {}
     for g, e in here.structure.events.items():
-        near = abs(desk.g[END_VALUES, g]) <= desk.real.drift * desk.g[END_ROUNDING, g]
-        if near and abs(desk.side[g]) == 1.0:
-            here.final_signs[e.name] = float(desk.side[g])
+        near = abs(guard_state.g[END_VALUES, g]) <= guard_state.real.drift * guard_state.g[END_ROUNDING, g]
+        if near and abs(guard_state.side[g]) == 1.0:
+            here.final_signs[e.name] = float(guard_state.side[g])
 
 
 def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
@@ -184,11 +186,13 @@ def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
     An event at the very end of the earlier motion has just happened. Any other is still ahead, however near: it keeps
     the sign that it had before its value was rounding. A value that is clearly nonzero now gives the sign itself.
     """
-    desk, told = loop.desk, events_at_start(here)
+    guard_state, told = loop.guard_state, events_at_start(here)
     values = instant_problem(here).guards()
     for g, e in here.structure.events.items():
-        desk.side[g] = 0.0 if e.name in told else here.final_signs.get(e.name) or np.sign(values[g]) or UNKNOWN_SIDE
-        desk.g[END_VALUES, g], desk.g[TRIGGER_VALUES, g] = values[g], here.zero.get(e.name, 0.0)
+        guard_state.side[g] = (
+            0.0 if e.name in told else here.final_signs.get(e.name) or np.sign(values[g]) or UNKNOWN_SIDE
+        )
+        guard_state.g[END_VALUES, g], guard_state.g[TRIGGER_VALUES, g] = values[g], here.zero.get(e.name, 0.0)
 
 
 # Switches whose guards are beyond zero at the end of a step though no crossing was detected.
@@ -204,12 +208,12 @@ def missed_crossings(here: EventContext, loop: GuardedLoop) -> frozenset[int]:
     decided in `nonsmooth_laws`.
     """
     S, out = here.c.system, set()
-    for g in loop.fired if loop.desk.count.leaves_kept_side else ():
+    for g in loop.fired if loop.guard_state.count.leaves_required_side else ():
         kind, s = int(S.guards.kind[g]), int(S.guards.of[g])
         if kind == G_CORNER:
             out.add(s)
         elif kind in DISTANCE_GUARDS:
-            before, now = np.abs(loop.desk.moving[:, 1, S.switches.measured[s]])
+            before, now = np.abs(loop.guard_state.moving[:, 1, S.switches.measured[s]])
             if before <= SLOW_SHARE * now:
                 out.add(s)
     return frozenset(out)
@@ -439,7 +443,7 @@ class EventDrivenMotion:
         self.engine.stop()
         self.loop = self._loop()
         if isinstance(before, GuardedLoop) and isinstance(self.loop, GuardedLoop):
-            self.loop.desk.side[:], self.loop.desk.g[:] = before.desk.side, before.desk.g
+            self.loop.guard_state.side[:], self.loop.guard_state.g[:] = before.guard_state.side, before.guard_state.g
         clock.count.started, clock.count.status = 0, ex.RUNNING
         if to not in IMPLICIT_METHODS and not clock.real.step:
             clock.real.h = 0.0  # chosen as at the start

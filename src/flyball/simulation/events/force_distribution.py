@@ -70,7 +70,7 @@ def least_accelerations(P: DenseProblem) -> tuple[np.ndarray, np.ndarray] | None
     x, z, soft = np.zeros(len(P.b)), np.zeros(free.shape[1]), scale
     for turn in range(LOAD_ITERATIONS):
         reach = np.maximum(P.const + P.gain @ x, 0.0)
-        x[driven] = -P.lean[driven] * reach[driven]
+        x[driven] = -P.bound_sign[driven] * reach[driven]
         w_d = B[driven].T @ x[driven]
         soft = max(SMOOTHING_FACTOR * soft, SMOOTHING * scale)
         old = x.copy()
@@ -247,9 +247,9 @@ def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) ->
     M[rows], r[rows] = P.A[rows], -P.b[rows]
     other = np.setdiff1d(np.arange(n), rows)
     M[other, other] = d[other] ** 2
-    M[driven] = P.lean[driven, None] * P.gain[driven] * d[driven, None] ** 2
+    M[driven] = P.bound_sign[driven, None] * P.gain[driven] * d[driven, None] ** 2
     M[driven, driven] += d[driven] ** 2
-    r[driven] = -P.lean[driven] * P.const[driven] * d[driven] ** 2
+    r[driven] = -P.bound_sign[driven] * P.const[driven] * d[driven] ** 2
     x = s * np.linalg.lstsq(M * np.outer(s, s), s * r, rcond=SINGULAR)[0]
     terms = np.abs(P.b) + np.abs(P.A) @ np.abs(x) + P.grain
     if (np.abs(P.A @ x + P.b)[rows] > ZERO_ACCELERATION * terms[rows]).any():

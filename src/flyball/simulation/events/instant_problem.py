@@ -110,14 +110,14 @@ class InstantProblem:
         self.first = self.W.sensed.shape[1] - len(self.m)
         ny, width = len(here.y), max(s.nv, len(S.rows.law), len(S.guards.kind), 1)
         none, y = np.zeros(0, np.int64), StateVectors.blank(ny)
-        seen = np.zeros((here.clock.seen.shape[0], 0))
-        self.desk = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
+        seen = np.zeros((here.clock.inspection.shape[0], 0))
+        self.state = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         R, self.output = tableau("rk45"), OutputBuffer(np.zeros((4, width)))
         self.tables = c.buffers
         self.engine = BoundKernel(
-            engine, *self.tables, StructBuffer(R), StructBuffer(self.desk), StructBuffer(self.output)
+            engine, *self.tables, StructBuffer(R), StructBuffer(self.state), StructBuffer(self.output)
         )
-        self.asked = StructBuffer(EngineCall(np.array([self.engine.address]), R, self.desk, self.output))
+        self.asked = StructBuffer(EngineCall(np.array([self.engine.address]), R, self.state, self.output))
         self.units = switch_units(s)
         self.characteristic_rate = float(here.c.array("options").rate)
         self.unit, metric = switch_scales(s, c.values.length), [unit == "m" for unit in self.units]
@@ -157,12 +157,12 @@ class InstantProblem:
         which, modes = np.flatnonzero(self.m >= 0), self.W.modes.mode.copy()
         self.switch_off_decided()
         self.put()
-        self.desk.y.current[nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
+        self.state.y.current[nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
         self.engine(MOTION)
-        q_dot, out, before = self.desk.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
+        q_dot, out, before = self.state.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
         for step in (0.0, POSITION_ROUNDING, -POSITION_ROUNDING):
             self.put()
-            self.desk.y.current[:nq] += step * q_dot
+            self.state.y.current[:nq] += step * q_dot
             if self.engine(MOTION) != 0:
                 break
             a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed.bias[self.m[which]]
@@ -196,8 +196,8 @@ class InstantProblem:
 
     def put(self) -> None:
         """Copy time and state of the motion into the workspace."""
-        self.desk.real.t = self.here.t
-        self.desk.y.current = self.here.y
+        self.state.real.t = self.here.t
+        self.state.y.current = self.here.y
 
     def run_engine(self, task: int) -> int:
         """Run a task of the engine at the state of the motion, on a copy of it."""
@@ -215,7 +215,7 @@ class InstantProblem:
         self.put()
         self.all.do(STORE_RATES)
         B = self.all.B
-        self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.seen + self.least
+        self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.previous + self.least
 
     def switch_off_decided(self) -> None:
         """Switch off all decided switches."""
@@ -237,7 +237,7 @@ class InstantProblem:
         """Return the second derivative of a quantity with the present modes."""
         self.run_engine(MOTION)
         nq = self.S.sizes.coordinates
-        vdot = self.desk.K[0, nq : nq + self.here.structure.nv]
+        vdot = self.state.K[0, nq : nq + self.here.structure.nv]
         return float(self.gradients(np.array([s]))[0] @ vdot + self.W.sensed.bias[self.m[s]])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -268,11 +268,11 @@ class InstantProblem:
         """Set up the problem of these rows at the state of the motion. Returns it and the status of its evaluation."""
         room = self.room(len(parts))
         B, P = room.B, room.P
-        for x in (B.asks, P.const, P.gain, P.lean, P.grain):
+        for x in (B.asks, P.const, P.gain, P.bound_sign, P.grain):
             x[...] = 0
         for i, part in enumerate(parts):
             B.which[i], B.sign[i], B.way[i], B.rate[i] = part.switch, part.sign, part.way, part.rate
-            P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.direction, part.const, part.state
+            P.rule[i], P.bound_sign[i], P.const[i], P.state[i] = part.rule, part.direction, part.const, part.state
             if part.of >= 0:
                 P.gain[i, part.of] = part.gain
         self.set_sliding(parts)
@@ -290,7 +290,7 @@ class InstantProblem:
         status.
         """
         B.asks[IMPULSES] = impulses
-        self.desk.real.t = self.here.t
+        self.state.real.t = self.here.t
         return self.workspaces[len(P.b)].do(SOLVE_MODES)
 
     def again(self, P: DenseProblem) -> int:
@@ -300,7 +300,7 @@ class InstantProblem:
     def project(self) -> None:
         """Project the state onto the active rows."""
         if self.run_engine(ARRIVE) == 0:
-            self.here.y[:] = self.desk.y.current
+            self.here.y[:] = self.state.y.current
 
     def guards(self) -> np.ndarray:
         """Return the values of all guards, (ng,)."""

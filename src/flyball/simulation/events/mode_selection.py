@@ -74,7 +74,7 @@ def activate_pressing_rows(n: InstantProblem, found: ModeDecision) -> None:
     a = B.free + found.x @ B.Y
     n.run_engine(MOTION)
     nq, nv = len(here.q), len(a)
-    q_dot = n.desk.K[0, :nq].copy()
+    q_dot = n.state.K[0, :nq].copy()
     span, step = here.clock.real.span, here.clock.real.h
     first = LOOKAHEAD_OF_STEP * step if 0.0 < step < span else LOOKAHEAD_OF_SPAN * span
     open_ = set(rows)
@@ -130,17 +130,17 @@ def write_rounding_levels(here: EventContext, loop: GuardedLoop) -> None:
 
     For quantities held at zero rate, a negligible rate is written as well.
     """
-    loop.desk.tied[:] = loop.desk.still[:] = loop.desk.least[:] = 0.0
+    loop.guard_state.tied[:] = loop.guard_state.still[:] = loop.guard_state.least[:] = 0.0
     if here.still:
         at = list(here.still)
-        loop.desk.still[at] = here.c.system.units[at] * reference_rate(here)
+        loop.guard_state.still[at] = here.c.system.units[at] * reference_rate(here)
     if here.tied or here.least:
         n = instant_problem(here)
         for g, (kind, s, _) in enumerate(n.guarded):
             if kind in FORCE_GUARDS:
-                loop.desk.least[g] = here.least.get(s, 0.0)
+                loop.guard_state.least[g] = here.least.get(s, 0.0)
             if (kind, s) in here.tied:
-                loop.desk.tied[g] = n.unit[s] * (n.pace if kind == G_BACK else 1.0)
+                loop.guard_state.tied[g] = n.unit[s] * (n.pace if kind == G_BACK else 1.0)
 
 
 ACCELERATION_TOLERANCE = 1e-7  # part of its terms below which an acceleration counts as zero
@@ -254,15 +254,15 @@ def solve_rows(n: InstantProblem, parts: list[ProblemRow], *, all_hold: bool = F
             P.state[resting] = AT_REST
             break
         for i in slips:
-            P.rule[i], P.lean[i] = SLIDING, 1.0 if P.state[i] == AT_LOW else -1.0
-            B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
+            P.rule[i], P.bound_sign[i] = SLIDING, 1.0 if P.state[i] == AT_LOW else -1.0
+            B.way[i] = P.bound_sign[i] if parts[i].way != 0.0 else 0.0
             P.const[i] = 0.0 if n.kinds[parts[i].switch].permanent else P.const[i]
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     rounding = P.grain * np.minimum(1.0 / np.maximum(P.A.diagonal(), 1e-300), n.inertia[B.which])
     sizes, least = ({p.switch: float(z) for p, z in zip(parts, of, strict=True)} for of in (terms, rounding))
     return ModeDecision(
-        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, least, P.A.copy(),
+        parts, ended, x, P.u.copy(), P.state.copy(), P.bound_sign.copy(), P.reach.copy(), sizes, least, P.A.copy(),
         P.gain.copy(), all_hold and bool(resting.any()),
     )  # fmt: skip
 

@@ -419,7 +419,7 @@ class Corners:
         h = self._lookahead()
         for part in (0.5, 1.0):
             n.run_engine(MOTION)
-            real.t, n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
+            real.t, n.here.y[:] = t + part * h, y + part * h * n.state.K[0]
         n.run_engine(MOTION)
         out = [self.value(s) for s in which]
         real.t, n.here.y[:] = t, y

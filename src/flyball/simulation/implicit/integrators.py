@@ -75,15 +75,15 @@ class ImplicitIntegrator:
         self.width, self.system = x.width, S
         self.light = c.values.cache.get("light", None, 1, lambda: substitute_inertias(c))
         key = type(self).__name__, index_3, self.light.tobytes(), int(S.flat[SCRATCH])
-        self.own: PooledBuffer = s.cache.get(
+        self.buffer: PooledBuffer = s.cache.get(
             "implicit steps", key, MOST_POOLS, lambda: self._workspace_pool(clock.y.shape[1])
         ).new()
-        initialise_work(s, self._complex_tables(S).fields, lambda name: self.own.array(f"WC.{name}"))
-        self.own.array("WC.options").rate = c.array("options").rate
+        initialise_work(s, self._complex_tables(S).fields, lambda name: self.buffer.array(f"WC.{name}"))
+        self.buffer.array("WC.options").rate = c.array("options").rate
         if len(s.rows):
-            self.own.array("plan.metric")[:] = inverse_inertias(c, float(clock.real.t), clock.y.current)
-        self.count = self.own.array("desk.count")
-        self._settle(self.own.array("desk.real"), len(S.angles.F) > 0)
+            self.buffer.array("plan.metric")[:] = inverse_inertias(c, float(clock.real.t), clock.y.current)
+        self.count = self.buffer.array("step.count")
+        self._settle(self.buffer.array("step.real"), len(S.angles.F) > 0)
 
     def bind(
         self,
@@ -98,7 +98,7 @@ class ImplicitIntegrator:
         if S is not self.system:  # other parameter values: masses may have changed
             self.system = S
             self.count.jacobians = 0
-        means = JoinedBuffer(self.means, self._complex_tables(S), self.own)
+        means = JoinedBuffer(self.means, self._complex_tables(S), self.buffer)
         addresses[1] = residual.residuals_kernel.address
         return BoundKernel(self.door, tables, scratch, means, state, progress)
 
@@ -109,7 +109,7 @@ class ImplicitIntegrator:
                  if isinstance(y, np.ndarray)]  # fmt: skip
         plan = JacobianPlan(
             x.first, x.pick, x.mass.pick, np.ones(x.nv), x.valued, x.valued.copy(), x.turns, x.pressing,
-            np.array([int(S.sizes.solver == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
+            np.array([int(S.sizes.solver == SCHUR)], np.int64), x.negative, self.light, x.inertia_entry,
         )  # fmt: skip
         springy = x.spring[self.light[x.spring[:, 0]] == 0.0] if len(self.light) else x.spring
         desk = self._solver_workspace(len(self.compiled.structure.states), springy)
@@ -195,9 +195,9 @@ class ImplicitIntegrator:
         return RadauStepWorkspace(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(3, nr), z(4, nr), z(4, nz),
             z(4, nz), z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx),
-            self._coordinate_of_velocity(), z(3, n), w(3, n), J, springy, x.put, x.part, z(nA), z(nL), z(nU),
+            self._coordinate_of_velocity(), z(3, n), w(3, n), J, springy, x.scatter, x.part, z(nA), z(nL), z(nU),
             z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
-            x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
+            x.whole_scatter, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 
     def _coordinate_of_velocity(self) -> np.ndarray:
@@ -241,7 +241,7 @@ class VariationalIntegrator:
         real, count = ds.ImplicitReals.blank(), ds.ImplicitCounts.blank()
         real.newton, real.rounding_size = TIGHT_VIOLATION * S.scales.length, ALLOWED_VIOLATION * S.scales.length
         n, z = int(S.row_start[nr]), np.zeros
-        self.desk = VariationalStepWorkspace(
+        self.workspace = VariationalStepWorkspace(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
             np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((REMEMBERED_STEPS, nr)),
             z((REMEMBERED_STEPS, nv)),
@@ -256,7 +256,7 @@ class VariationalIntegrator:
         addresses: np.ndarray,
     ) -> BoundKernel:
         """Return the kernel of the steps bound to these arguments."""
-        return BoundKernel(variational_steps, tables, scratch, StructBuffer(self.desk), state, progress)
+        return BoundKernel(variational_steps, tables, scratch, StructBuffer(self.workspace), state, progress)
 
     @property
     def failed(self) -> SimulationError | None:
@@ -344,7 +344,7 @@ class AlphaIntegrator(ImplicitIntegrator):
         super()._settle(real, turns)
         steps = float(self.clock.real.span / self.clock.real.step)  # the iteration errors of all steps add up
         real.newton = max(10.0 * MACHINE_EPSILON / real.rtol, min(0.1, 1.0 / steps))
-        self.own.array("desk.rho")[0] = self.rho
+        self.buffer.array("step.rho")[0] = self.rho
 
     def _solver_workspace(self, nz: int, springy: np.ndarray) -> AlphaStepWorkspace:  # type: ignore[override]
         w = super()._solver_workspace(nz, springy)

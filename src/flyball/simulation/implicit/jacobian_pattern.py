@@ -190,10 +190,10 @@ class JacobianLayout:
         first = np.cumsum([1, a + both.sum(), c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
-        own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in order
-        self.own_mass = own_mass.astype(np.int64)
+        inertia_entry = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in order
+        self.inertia_entry = inertia_entry.astype(np.int64)
         e = np.flatnonzero((i < nv) & (j < nv))
-        self.spring = np.column_stack([i[e], j[e], picked + e, own_mass[i[e]], picked + again[e]]).astype(np.int64)
+        self.spring = np.column_stack([i[e], j[e], picked + e, inertia_entry[i[e]], picked + again[e]]).astype(np.int64)
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
@@ -239,7 +239,7 @@ class JacobianLayout:
         i, j, number = (np.concatenate([e[k] for g in groups for e in g]).astype(np.int64) for k in range(3))
         count = [sum(len(e[0]) for e in g) for g in groups]
         self._coupled_stages(i, j, number, count)
-        self.P, self.put = self._ordered(n, i, j, number, 1)
+        self.P, self.scatter = self._ordered(n, i, j, number, 1)
         self.part = np.cumsum(count)[:2].astype(np.int64)
 
     def _coupled_stages(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
@@ -251,7 +251,7 @@ class JacobianLayout:
         at_i, at_j = (np.concatenate([x[p[0]] + n * p[w] for p in parts]) for x, w in ((i, 1), (j, 2)))
         self.whole_P, put = self._ordered(STAGES * n, at_i, at_j, np.concatenate([number[p[0]] for p in parts]), STAGES)
         stage = np.concatenate([np.full(len(p[0]), p[1]) for p in parts])
-        self.whole_put = np.ascontiguousarray(
+        self.whole_scatter = np.ascontiguousarray(
             np.column_stack([put[:, 0], stage, put[:, 1], np.concatenate([p[3] for p in parts])])
         ).astype(np.int64)
 

@@ -60,7 +60,7 @@ def fill_rows(G, M, C, P, L, state):
         a, b = P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
         point = load3(C.x.point, c, 0)
         store3(P.frame, c, 0, load3(C.x.normal, c, 0))
-        apart = load3(C.x.apart, c, 0)
+        apart = load3(C.x.half_separation, c, 0)
         store3(P.arm, c, 0, arm_to(M, a, sub(point, apart)))
         store3(P.arm, c, 3, arm_to(M, b, add(point, apart)))
         law = L.pair[G.shape.material[i], G.shape.material[j]]

@@ -88,7 +88,7 @@ class OutputRecorder:
         self.twist.append(s.workspaces.X.v[:, :6].copy())
         sums = s.state.sums.copy()
         sums.impact_loss += s.joints.real.lost
-        sums.numerical_loss += s.joints.real.astray
+        sums.numerical_loss += s.joints.real.joint_loss
         self.sums.append(sums)
         if self.held:
             self.held.add(s.joints, moved)

@@ -75,7 +75,7 @@ def gravity_sum(A, column):
 def add_reaction_work(A, lam, v):
     """Account for the work of joint impulses at velocities v, beyond that of prescribed rates."""
     for r in range(A.S.rows.law.shape[0]):
-        A.real.astray -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
+        A.real.joint_loss -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
 
 
 @formula
@@ -89,7 +89,7 @@ def close_energy_account(A):
     """Account for the energy taken by the projection onto the joints, at the end of a step with contact impulses."""
     now = -gravity_sum(A, 0)
     if A.real.kinetic >= 0.0:
-        A.real.astray += A.real.kinetic - kinetic_energy(A) - (now - A.real.potential) - A.real.gravity_work
+        A.real.joint_loss += A.real.kinetic - kinetic_energy(A) - (now - A.real.potential) - A.real.gravity_work
     A.real.potential = now
 
 
@@ -273,7 +273,7 @@ def run_task(A, M, C, P, X, task):
             A.reactions.impact[r] += A.output.rows[3, r]
     if task == TASK_FINAL_VELOCITIES:
         A.real.time += A.real.step
-        A.count.begun = 0
+        A.count.step_started = 0
         close_energy_account(A)
         for d in range(A.velocities.before.shape[0]):
             X.wide[d] = A.clock.y.current[A.S.sizes.coordinates + d]
@@ -298,13 +298,13 @@ def make_consistent(A, X):
         X.wide[d] += rows[2, d]
         A.velocities.before[d] = X.wide[d]
     for r in range(A.S.rows.law.shape[0]):
-        A.real.astray -= rows[3, r] * row_times(A.S, A.W, r, A.velocities.displacement)
+        A.real.joint_loss -= rows[3, r] * row_times(A.S, A.W, r, A.velocities.displacement)
 
 
 @formula
 def start_mechanism(A, M, X):
     """Evaluate the start of the motion, which must be on the constraints: accelerations, multipliers, efforts."""
-    A.count.begun = 0
+    A.count.step_started = 0
     A.clock.real.t = A.real.time
     status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
     save_evaluation(A, A.real.step)
@@ -325,12 +325,12 @@ def start_mechanism(A, M, X):
 def free_step(A, M, X):
     """Compute the velocities without contact from those in ``X.wide``; a repeated call restarts at the same state."""
     y, nq = A.clock.y, A.S.sizes.coordinates
-    if A.count.begun == 0:
+    if A.count.step_started == 0:
         for i in range(y.shape[1]):
             y[1, i] = y[0, i]
         for r in range(A.reactions.smooth.shape[0]):
             A.reactions.impact[r] = 0.0
-        A.count.begun = 1
+        A.count.step_started = 1
     for i in range(y.shape[1]):
         y[0, i] = y[1, i]
     for d in range(A.velocities.before.shape[0]):

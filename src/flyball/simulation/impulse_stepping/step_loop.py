@@ -114,7 +114,7 @@ def bind_solvers(
 
 def solver_counts(F: StepSolvers) -> np.ndarray:
     """Return the counts of solvers chosen for the velocity problem; empty where the choice is fixed."""
-    return F.velocities.told if F.velocities.doors[SMALL_ISLAND_SOLVER] else np.zeros(0, np.int64)
+    return F.velocities.statistics if F.velocities.doors[SMALL_ISLAND_SOLVER] else np.zeros(0, np.int64)
 
 
 LIFT_PASSES = 16
@@ -329,7 +329,7 @@ def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, now):
 def energies_and_counts(A, state):
     """Return the energies exchanged by contacts, stops and joints so far, numerical losses, and counts of impacts."""
     s, n = state.sums, state.counts
-    energies = (s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.astray)
+    energies = (s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.joint_loss)
     return energies, (n.impacts, n.reduced_expansions, n.endless_impacts)
 
 
@@ -346,7 +346,7 @@ def restore_start(N, M, A, X, state, sums):
         A.reactions.impact[r] = 0.0
     s, n = state.sums, state.counts
     energies, counts = sums
-    s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.astray = energies
+    s.impact_loss, s.friction_loss, s.surface_work, s.numerical_loss, A.real.lost, A.real.joint_loss = energies
     n.impacts, n.reduced_expansions, n.endless_impacts = counts
 
 
@@ -467,7 +467,7 @@ def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state,
     """Compute impacts, velocities and displacements for `take_step`. Returns a status."""
     if free_velocities_of_all(A, M, C, P, X, N, state) != DONE:
         return NO_SOLUTION
-    B.real.ahead = state.times.step
+    B.real.horizon = state.times.step
     status = call(state.addresses.search, G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
@@ -504,9 +504,9 @@ def run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T,
     """Run the steps; see `step_loop_kernel`."""
     while state.counts.steps_left > 0:
         if state.counts.steps_taken % 2 == 0:
-            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T.kept, U.kept)
+            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T.memory, U.memory)
         else:
-            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, U.kept, T.kept)
+            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, U.memory, T.memory)
         if status != DONE:
             return status
     return DONE

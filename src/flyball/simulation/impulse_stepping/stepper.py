@@ -99,7 +99,7 @@ def make_workspaces(
     F = bind_solvers(solver, (P, Q, R), X, W, O, state)
     kept = [ContactMemory.blank(contacts) for _ in range(2)]
     if old is not None:
-        for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
+        for a, b in zip(kept, (old.T.memory, old.U.memory), strict=True):
             a[: len(b)] = b
         solver_counts(F)[:] += solver_counts(old.F)
     return StepWorkspaces(P, Q, R, X, Y, Z, E, W, O, F, ContactHistory(kept[0]), ContactHistory(kept[1]))
@@ -306,5 +306,5 @@ class Stepper:
     def last(self) -> tuple[Contacts, ContactMemory]:
         """Return the contacts of the last step, and their history."""
         if self.state.counts.steps_taken % 2 == 1:
-            return self.finder.now, self.workspaces.T.kept
-        return self.finder.before, self.workspaces.U.kept
+            return self.finder.now, self.workspaces.T.memory
+        return self.finder.before, self.workspaces.U.memory

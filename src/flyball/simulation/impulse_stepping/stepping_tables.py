@@ -81,7 +81,7 @@ class ContactMemory(Record, kind="Float", rows=True):
 class ContactHistory(NamedTuple):
     """Stored data of each contact; one for each of the two tables of contacts."""
 
-    kept: ContactMemory
+    memory: ContactMemory
 
 
 class RunTimes(Record, kind="Float"):
@@ -217,7 +217,7 @@ class MechanismReals(Record, kind="Float"):
     potential: float  # potential energy of gravity
     gravity_work: float  # work of gravity over the step at the mean velocities
     kinetic: float  # kinetic energy before the projection onto the joints; -1 without contact impulses
-    astray: float  # energy lost numerically at joints
+    joint_loss: float  # energy lost numerically at joints
 
 
 class MechanismCounts(Record, kind="Int"):
@@ -229,7 +229,7 @@ class MechanismCounts(Record, kind="Int"):
     unsettled: int  # steps whose velocities did not converge
     needed: int  # numbers that J and Y must hold
     jobs: int  # rows that ``job`` must hold
-    begun: int  # whether a step has begun
+    step_started: int  # whether a step has begun
     accept_unsettled: int  # whether the step is accepted with velocities that did not converge
 
 

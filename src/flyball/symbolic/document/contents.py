@@ -220,7 +220,7 @@ def equations_of_motion(eq: Equations, acting: Section) -> Section:
         for k, v in enumerate(T.v):
             before = [(T.M[k, j], a) for j, a in enumerate(x.vdot) if T.M[k, j] != 0.0]
             after = [(T.G[r, k], lam) for r, lam in enumerate(T.lam) if T.G[r, k] != 0.0]
-            parts = [f for f in given if f.left.plain == velocity_force(k, v).plain]
+            parts = [f for f in given if f.left.text == velocity_force(k, v).text]
             by.setdefault(v.data.element, []).append(Formula(ZERO, T.f[k], "", before, after, parts))
         out += [Formulas(owner, rows) for owner, rows in by.items()]
     return Section("motion", "Equations of motion", out)

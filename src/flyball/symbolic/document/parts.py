@@ -79,10 +79,10 @@ def inertia_labels(inertia: Any, planar: bool) -> list[Any]:
 
 @dataclass(frozen=True)
 class Tex:
-    """A formula in a cell of a table, or a label; ``plain`` is the same as text."""
+    """A formula in a cell of a table, or a label; ``text`` is the same as text."""
 
     latex: str
-    plain: str
+    text: str
 
 
 Cell = str | Tex

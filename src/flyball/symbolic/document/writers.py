@@ -56,7 +56,7 @@ def nonzero_entries(matrix: Matrix) -> list[Formula]:
         if x != 0.0:
             where = ",".join(str(i + 1) for i in k)
             out.append(
-                Formula(Tex(f"{_entry_letter(matrix.left.latex)}_{{{where}}}", f"{matrix.left.plain}[{where}]"), x)
+                Formula(Tex(f"{_entry_letter(matrix.left.latex)}_{{{where}}}", f"{matrix.left.text}[{where}]"), x)
             )
     return out
 
@@ -101,7 +101,7 @@ def text_lines(block: Block, width: int) -> list[str]:
     if isinstance(block, Paragraph):
         return [block.text]
     if isinstance(block, Display):
-        return [block.formula.plain]
+        return [block.formula.text]
     if isinstance(block, DataTable):
         return text_table([block.columns, *block.rows])
     if isinstance(block, Matrix):
@@ -113,7 +113,7 @@ def text_lines(block: Block, width: int) -> list[str]:
 def text_formula(f: Formula, width: int) -> list[str]:
     """A formula in lines."""
     printer = TextPrinter()
-    before = f.left.plain if not f.before else printer.products(f.before)
+    before = f.left.text if not f.before else printer.products(f.before)
     after = printer.expression(f.right)
     if f.after:
         more = printer.products(f.after)
@@ -127,18 +127,18 @@ def text_matrix(m: Matrix, width: int) -> list[str]:
     """A matrix under its columns' names; entry by entry if it is too wide."""
     printer = TextPrinter()
     rows = [
-        [m.rows[i].plain, *("." if x == 0.0 else printer.expression(x) for x in row)] for i, row in enumerate(m.entries)
+        [m.rows[i].text, *("." if x == 0.0 else printer.expression(x) for x in row)] for i, row in enumerate(m.entries)
     ]
-    head = ["", *(c.plain for c in m.columns)]
+    head = ["", *(c.text for c in m.columns)]
     lines = text_table([head, *rows]) if m.columns else text_table(rows)
     if max(map(len, lines), default=0) <= width:
-        return [f"  {m.left.plain} =", *(f"  {line}" for line in lines)]
+        return [f"  {m.left.text} =", *(f"  {line}" for line in lines)]
     return [line for f in nonzero_entries(m) for line in text_formula(f, width)]
 
 
 def text_table(rows: Sequence[Sequence[Cell]]) -> list[str]:
     """Rows with their columns under one another."""
-    texts = [[c.plain if isinstance(c, Tex) else c for c in row] for row in rows]
+    texts = [[c.text if isinstance(c, Tex) else c for c in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
     return ["  " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in texts]
 
