@@ -334,7 +334,7 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
     most = c.real.tried
     note(S, W, END_VALUES)
     note_state_drift(W, c)
-    if c.seen.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
+    if c.inspection.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
         shorten_step(c, 0.5 * most)
         return used, False
     status, h, hit = end_on_first_event(callbacks, S, W, R, c)
