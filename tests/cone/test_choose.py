@@ -109,7 +109,7 @@ def test_uneven_masses_go_to_newton_in_larger_islands(ratio, to_newton):
     O.count.most, O.real.enough = 100_000, 1e-9
     made = prepare_solver("auto", P, X, W, O)
     made.kernel(P, X, W, O, made.F, 0)
-    assert made.statistics[SMALL_SOLVED] == to_newton and made.told[OTHER_SOLVED] == 1 - to_newton
+    assert made.statistics[SMALL_SOLVED] == to_newton and made.statistics[OTHER_SOLVED] == 1 - to_newton
     assert O.count.ended == CONVERGED
     assert X.p[:, 0] == pytest.approx((1 / P.node[::-1, 0]).cumsum()[::-1], rel=1e-4)
     assert abs(X.v).max() < 1e-5

@@ -104,7 +104,7 @@ def test_standard_pictures_and_reports_of_sets_and_contacts(planar: bool, tmp_pa
     r = thrown(planar=planar)
     for bodies in (list(r.model.bodies), []):
         r.model.bodies[:] = bodies  # a model of sets only has no other bodies to show
-        found = {p.name: p.shown for p in standard_pictures(r)}
+        found = {p.name: p.content for p in standard_pictures(r)}
         paths = found["paths"]
         assert isinstance(paths, PointPaths)
         assert ("block" in paths.points) == bool(bodies)

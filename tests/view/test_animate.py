@@ -268,8 +268,8 @@ def test_symbols_are_smaller_on_slender_parts() -> None:
 def test_curves_and_notes(result: Result, recording: Recording) -> None:
     names = [c.name for c in recording.channels]
     assert len(names) <= 60
-    assert set(recording.shown) <= set(names)
-    assert recording.shown[0] == "motor.effort"
+    assert set(recording.plotted) <= set(names)
+    assert recording.plotted[0] == "motor.effort"
     assert recording.notes["freedoms"] == "0"
     assert "slider/crank" in animation_html(result)
 

@@ -37,7 +37,7 @@ def test_what_is_to_be_followed_stands_beside_what_follows(result: Result) -> No
 
 
 def test_the_page_opens_with_them(result: Result) -> None:
-    shown = record_motion(result).shown
+    shown = record_motion(result).plotted
     assert shown[:4] == ("pid.setpoint", "pid.measured", "pid.output", "K.small")
     assert "A.displacement" not in shown  # which is pid.measured
     assert "energy.total" in shown

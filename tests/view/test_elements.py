@@ -318,7 +318,7 @@ def test_sensors_are_shown_first_and_listed() -> None:
     result = m.simulate(1.0, outputs=21)
     recording = record_motion(result)
     check_recording(recording)
-    assert recording.shown[0] == "height.value"
+    assert recording.plotted[0] == "height.value"
     assert recording.facts["height"] == ("Sensor", "of b.y")
     drawn = {f.name: f for f in standard_figures(result)}["sensors"]
     curves = {c.name: c.values for p in drawn.panels for c in p.curves}
