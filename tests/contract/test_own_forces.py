@@ -420,6 +420,50 @@ def test_a_wrong_class_is_caught_by_the_part_that_it_breaks(part):
         check_element(breaking(**BROKEN[part])("air", "puck", coefficient=0.8))
 
 
+def with_a_torque(par, F, M, laws, values):
+    d = sub(M[0], F[0])
+    return scale(-par[0], d), scale(par[0], d)
+
+
+def off_the_line(par, F, M, laws, values):
+    o = 0.0 * par[0]
+    return scale(-par[0], sub(M[3], F[3])), (o, o, o)
+
+
+def along_an_axis_of_the_body(par, F, M, laws, values):
+    o = 0.0 * par[0]
+    return scale(par[0], (M[1][0], M[1][3], M[1][6])), (o, o, o)
+
+
+@pytest.mark.parametrize(
+    ("wrench", "role", "why"),
+    [
+        (with_a_torque, "M", "exerts a torque about the origin of frame M"),
+        (with_a_torque, "F", "exerts a torque about the origin of frame F"),
+        (off_the_line, "M", ""),
+        (off_the_line, "F", "exerts a torque about the origin of frame F"),
+        (along_an_axis_of_the_body, "M", "depends on the orientation or angular velocity of frame M"),
+    ],
+)
+def test_a_force_between_two_points_makes_no_torque_on_a_point_mass(wrench, role, why):
+    """A point mass would not turn; a body with inertia does."""
+    members = {"__module__": __name__, "__annotations__": {}, "wrench": staticmethod(wrench)}
+    cls = element(type("Between", (CubicSpring,), members | {"conservative": lambda self: False}))
+    with pytest.raises(
+        ContractError, match=r"Between 's' fails the check 'points': wrench.* derive the class from Two"
+    ):
+        check_element(cls("s", "a", "b", stiffness=1))
+    for inertia in (0, (1, 1, 1)):
+        m = fb.Mechanism("pair")
+        m.add(fb.Body("p", mass=1, inertia=inertia, position=(1, 0, 0)))
+        m.add(cls("s", *(("ground", "p") if role == "M" else ("p", "ground")), stiffness=1))
+        if why and inertia == 0:
+            with pytest.raises(fb.ModelError, match=rf"Between 's': its wrench {why}, but Body 'p' has no inertia"):
+                m.simulate(0.1)
+        else:
+            m.simulate(0.1, outputs=2)
+
+
 # -- joints
 
 

@@ -71,7 +71,10 @@ class Force(Element):
         return ""
 
     def on_points(self) -> bool:
-        """Return whether it depends only on the origins of its frames, and makes no torque about them."""
+        """Return whether it depends only on the origins of its frames, and makes no torque about them.
+
+        It may then act on point masses; a user-defined formula is checked (`tables.point_formulas`).
+        """
         return False
 
 

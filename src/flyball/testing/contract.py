@@ -352,6 +352,7 @@ _NUMBER_CHECKS: Checks = {
     "symbols": formula_checks.symbols,
 }
 _INVARIANCE_CHECKS: Checks = {
+    "points": formula_checks.points,
     "axes": formula_checks.axes,
     "units": formula_checks.units,
     "file": file_round_trip,

@@ -23,6 +23,7 @@ from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.joint import Joint
 from ..model.units import powers_in_si
+from ..tables.point_formulas import REMEDIES, force_wrench, law_values, orientation_need, row_wrench
 
 if TYPE_CHECKING:
     from .contract import Subject
@@ -88,7 +89,6 @@ def wrench_power(wrench: Any, F: Frame, M: Frame) -> Any:
     return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])
 
 
-LAWS = (1.0, -2.0, 0.5)
 SEEDS = range(4)
 INPUTS, WRENCH, EFFORT, _ = SIGNATURES
 (ROW,) = ROWS
@@ -160,7 +160,7 @@ def nested_zeros(lengths: Any) -> Any:
 def force_states(e: Force, par: Sequence[float]) -> list[FormulaState]:
     """States of the formulas of a force with these parameters."""
     par = (*par, *(0.0,) * (16 - len(par)))
-    laws = tuple(x if law is not None else 0.0 for x, law in zip(LAWS, (*e.laws(), None, None, None), strict=False))
+    laws = law_values(e)
     out = []
     for seed in SEEDS:
         if isinstance(e, CoordinateForce):
@@ -386,6 +386,21 @@ def _rate(row: Any, F: Any, M: Any) -> Any:
 def _size(state: FormulaState) -> float:
     """The largest number in the result of a state."""
     return float(np.abs(state.at(state.numbers.tolist())).max())
+
+
+def points(s: Subject) -> str:
+    """What may act on a point mass exerts no torque there, and does not depend on the orientation of its frame."""
+    for state in s.states:
+        if state.row is not None:
+            roles, formula = state.row.points, row_wrench(state.row, state.arguments[0])
+        elif state.signature == WRENCH and isinstance(s.element, Force) and s.element.on_points():
+            roles, formula = "FM", force_wrench(s.element, state.arguments[0], state.arguments[3])
+        else:
+            continue
+        for role in (x for x in roles if x in s.element.ends()):
+            if why := orientation_need(formula, state.arguments[1], state.arguments[2], role):
+                return f"{state.signature} {why}, which may be on a point mass: {REMEDIES[state.row is not None]}"
+    return ""
 
 
 def axes(s: Subject) -> str:
