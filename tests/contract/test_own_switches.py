@@ -15,6 +15,7 @@ from flyball.constraints.switches.switch_kind import ANY_FORCE, INTERVAL
 from flyball.elements import Number, ProblemRow, Switch, SwitchKind, Unilateral, element
 from flyball.model.element import Element
 from flyball.numerics.complementarity.dense_problem import AT_REST, BILATERAL, FRICTION_LINE
+from flyball.testing import ContractError, check_element
 
 
 class CatchKind(SwitchKind):
@@ -68,7 +69,7 @@ class Catch(Unilateral):
 @pytest.fixture(autouse=True, scope="module")
 def forgotten():
     yield
-    for name in ("Catch", "Hook"):
+    for name in ("Catch", "Hook", "Printer"):
         Element.registry.pop(name, None)
         Element.modules.pop(name, None)
 
@@ -97,6 +98,31 @@ def test_fast_ones_pass():
     r = run("joint", "0", speed=0.4)
     assert not len(r.events)
     assert r["b"].velocity[-1, 0] == pytest.approx(-0.5)
+
+
+def test_the_contract_covers_motions_and_the_guard():
+    assert {"guard", "file", "books", "layers"} <= set(check_element(Catch("catch", "P.displacement", speed=0.1)))
+
+
+class PrinterKind(CatchKind):
+    """Its guard gives in Python what no compiled code can."""
+
+    @staticmethod
+    def guard(mode, way, x, rate, force, numbers, units):
+        return float(f"{x:.17g}")
+
+
+@element
+class Printer(Catch):
+    """A catch with such a guard."""
+
+    def switches(self):
+        return (Switch(PrinterKind(**vars(CATCH)), along=self.along(), weighted=True),)
+
+
+def test_a_guard_that_cannot_be_compiled_breaks_the_contract():
+    with pytest.raises(ContractError, match=r"Printer 'catch' fails the check 'guard': .*cannot be compiled"):
+        check_element(Printer("catch", "P.displacement"))
 
 
 class HookKind(SwitchKind):

@@ -6,6 +6,7 @@ Formulas are evaluated at random states of frames in arbitrary motion, as functi
 from __future__ import annotations
 
 import ctypes
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -13,9 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..compiler.kernels import FormulaCode, Signature
+from ..compiler.kernels import CodeTable, FormulaCode, Signature, short_reason
 from ..constraints.blocks import ConstraintRow
 from ..constraints.registry import SIGNATURES as ROWS
+from ..constraints.switches.guard_kinds import HELD, OFF, STEADY
+from ..constraints.switches.guard_kinds import SIGNATURES as GUARDS
+from ..errors import ModelError
 from ..expression_graph.evaluation import evaluate
 from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision
 from ..forces import SIGNATURES
@@ -132,7 +136,13 @@ class FormulaState:
             np.ascontiguousarray(x, dtype),
             np.zeros(len(list(flat_numbers(nested_zeros(self.signature.result)))), dtype),
         )
-        ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(code.address)(given.ctypes.data, out.ctypes.data)
+        try:
+            address = code.address
+        except (ImportError, MemoryError):
+            raise
+        except Exception as error:  # Numba raises many kinds of exceptions
+            raise ModelError(f"{self.signature} cannot be compiled: {short_reason(error)}") from error
+        ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)(given.ctypes.data, out.ctypes.data)
         return out
 
 
@@ -237,6 +247,22 @@ def compiled(s: Subject) -> str:
         plain, fast = state.at(x.tolist()), state.compiled(x, False)
         if _differ(plain, fast, ROUNDING):
             return f"{state.signature} is {_array_text(plain)} in Python and {_array_text(fast)} compiled"
+    return ""
+
+
+def guards(s: Subject) -> str:
+    """Compiled guards of a user-defined kind of switch give what Python gives, nan included, in every mode."""
+    for kind in {type(x.kind) for x in s.element.switches() if hasattr(x.kind, "guard")}:
+        (signature,) = CodeTable(kind, GUARDS).signatures
+        for mode, seed in itertools.product((OFF, HELD, STEADY), SEEDS):
+            numbers = np.random.default_rng(seed).normal(size=sum(signature.lengths) + signature.lengths.count(0))
+            given = nest_numbers(signature.lengths, iter([mode, float(np.sign(numbers[1])), *numbers[2:].tolist()]))
+            state = FormulaState(signature, kind.guard, given)
+            plain, fast = state.at(state.numbers.tolist()), state.compiled(state.numbers, False)
+            if _differ(plain, fast, ROUNDING):
+                return (
+                    f"{signature} of {kind.__name__} is {_array_text(plain)} in Python and {_array_text(fast)} compiled"
+                )
     return ""
 
 
