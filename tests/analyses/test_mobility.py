@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 import flyball as fb
 from flyball.cli import app
 from flyball.model.element import Element, element
+from flyball.model.messages import kind_in_words
+from flyball.results.mobility import JointChange
 from tests.analyses.linkages import bennett, four_bar_driven
 from tests.assembly.test_mobility import in_space, parallelogram, rssr
 from tests.mechanisms import bricard, door, example, four_bar, free_body, planar_rod
@@ -219,6 +221,30 @@ def test_sets_that_share_joints_need_their_own_changes():
         m, left = s.cure.applied(m), left - s.count
         assert (m.mobility().redundancy, m.mobility().freedoms) == (left, 1)
     assert left == 0
+
+
+def test_a_line_of_shafts_has_a_remedy_for_every_set():
+    """Each shaft on a bearing, springs about the hinges between them: bearings can be left out, the hinges cannot.
+
+    If the first set leaves out the bearing in the middle, only the hinges are left to the other set.
+    """
+    m = fb.Mechanism("shaft line")
+    for k in range(3):
+        m.add(fb.Body(f"s{k}", mass=1, inertia=(0.1, 0.1, 0.1), position=(k, 0, 0)))
+    m.add(fb.Revolute("B0", "ground", "s0", at=(0, 0, 0), axis=(1, 0, 0)), fb.Driver("motor", "B0.angle", "t"))
+    for k in (1, 2):
+        m.add(fb.Cylindrical(f"B{k}", "ground", f"s{k}", at=(k, 0, 0), axis=(1, 0, 0)))
+        m.add(fb.Revolute(f"C{k}", f"s{k - 1}", f"s{k}", at=(k - 0.5, 0, 0), axis=(1, 0, 0)))
+        m.add(fb.TorsionalSpringDamper(f"w{k}", joint=f"C{k}", stiffness=3))
+    found = m.mobility()
+    assert (found.freedoms, found.redundancy) == (2, 8)
+    for s in found.sets:
+        m = s.cure.applied(m)
+    assert (m.mobility().freedoms, m.mobility().redundancy) == (2, 0)
+
+
+def test_a_kind_of_joint_is_named_in_words():
+    assert JointChange("J", kind_in_words(fb.PointInPlane), None).text == "leave out point in plane 'J'"
 
 
 def test_where_the_search_for_cures_is_cut_it_says_so(monkeypatch):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from flyball import forces
-from flyball.constraints.registry import KINDS, RARE, Kind, ordered
+from flyball.compiler.formulas import dispatch_by_kind
+from flyball.constraints.registry import KINDS, RARE, Kind, no_inputs, ordered
 from flyball.engine import element_dispatch
-from flyball.model.force import CoordinateForce
+from flyball.model.force import CoordinateForce, TwoFrameForce
 from flyball.testing.formula_checks import frame_record, random_motion
 from tests.contract.test_forces import LAWS, full
 
@@ -49,8 +50,23 @@ def test_two_forces_of_one_kind_are_refused():
 
         effort = staticmethod(lambda par, x, rate, laws, load: 0.0)
 
-    with pytest.raises(RuntimeError, match=rf"kind {forces.Rope.kind} is taken twice.*rope.*test_dispatch"):
+    free = 1 + max(c.kind for c in (*forces.ALL, *forces.LIMITS) if hasattr(c, "kind"))
+    taken = rf"kind {forces.Rope.kind} is taken twice.*rope.*test_dispatch; the next free is {free}"
+    with pytest.raises(RuntimeError, match=taken):
         forces.formulas([*forces.ALL, Twin], "effort")
+
+
+def test_a_formula_without_its_decorator_is_refused_by_name():
+    with pytest.raises(
+        RuntimeError, match=r"cannot call tests\.contract\.test_dispatch\.a_row: put the decorator @formula"
+    ):
+        dispatch_by_kind(__name__, "row", "par, F, M, hint, data", {0: a_row}, "nan")
+
+
+def test_the_zeros_of_a_base_class_are_a_formula():
+    """A force of the package may inherit them."""
+    assert TwoFrameForce.inputs is no_inputs
+    assert dispatch_by_kind(__name__, "some_inputs", "par, F, M", {0: no_inputs}, "nan")(0, (), *frames()) == (0.0, 0.0)
 
 
 def a_row(par, F, M, hint, data):
@@ -59,7 +75,9 @@ def a_row(par, F, M, hint, data):
 
 def test_kinds_of_rows_are_numbered_without_gaps_and_frequent_ones_first():
     n = len(KINDS)
-    with pytest.raises(RuntimeError, match=r"KIND 3 is taken twice: by flyball\.constraints\.distance and"):
+    with pytest.raises(
+        RuntimeError, match=rf"KIND 3 is taken twice: by flyball\.constraints\.distance and.*; the next free is {n}"
+    ):
         ordered([*KINDS, Kind(3, a_row)])
     with pytest.raises(RuntimeError, match="must be 0, 1, 2"):
         ordered([*KINDS, Kind(n + 1, a_row)])

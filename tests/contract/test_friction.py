@@ -1,12 +1,14 @@
 """Friction in joints: closed forms in motion, sticking, the load that counts, and joints that jam."""
 
 import re
+import warnings
 
 import numpy as np
 import pytest
 
 import flyball as fb
 from flyball.errors import SimulationError
+from flyball.model.element import element
 from tests.layers import AUTO, both_layers, in_force
 
 pytestmark = both_layers
@@ -349,6 +351,35 @@ def test_a_second_friction_on_one_surface_is_refused():
             m.add(fb.JointFriction("g", "table", static=0.3, **second))
         m.add(fb.JointFriction("seal", "table", static=0.1, preload=5, **first))
         m.replace(fb.JointFriction("f", "table", static=0.2, **first))
+
+
+@element
+class Tray(fb.Planar):
+    """A joint of two slides that does not declare whether they are of one surface."""
+
+    one_surface = False
+
+
+@element
+class Gantry(fb.Orientation):
+    """One without a normal force."""
+
+
+def test_friction_along_two_directions_of_one_plane_is_a_box_and_says_so():
+    for joint, said in ((Tray, 1), (Gantry, 0)):
+        m = fb.Mechanism("table")
+        m.add(fb.Body("block", mass=1, inertia=(1, 1, 1)))
+        axis = {"axis": (0, 0, 1)} if joint is Tray else {}
+        m.add(joint("table", "ground", "block", at=(0, 0, 0), **axis))
+        m.add(fb.JointFriction("f", "table", static=0.3, coordinate="x"))
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            m.add(fb.JointFriction("g", "table", static=0.3, coordinate="y"))
+        assert len(found) == said
+        for x in found:
+            assert re.match(
+                r"JointFriction 'g' and JointFriction 'f' .*in one plane of Tray 'table'.*one_surface", str(x.message)
+            )
 
 
 def test_friction_of_a_screw_says_what_it_needs():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pickle
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, ClassVar
@@ -21,6 +23,8 @@ from flyball.elements import (
     LawOf,
     Length,
     Number,
+    PointPair,
+    TwoFrameForce,
     TwoPointForce,
     Unit,
     blocks,
@@ -29,7 +33,7 @@ from flyball.elements import (
 )
 from flyball.forces import spring_damper
 from flyball.math.scalar import divide
-from flyball.math.vec import dot, norm, scale, sub
+from flyball.math.vec import col, cross, dot, norm, scale, sub
 from flyball.testing import ContractError, check_element
 from tests.layers import both_layers
 
@@ -267,11 +271,23 @@ def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
         fb.load(tmp_path / "breeze.toml")
 
 
-def test_a_name_of_flyballs_own_is_refused():
-    with pytest.raises(fb.ModelError, match=r"the class Rope of .*test_own_forces.*give your own class another"):
+TAKEN = """
+import pytest
+from flyball.elements import BodyForce, element
+from flyball.errors import ModelError
 
-        class Rope(BodyForce):
-            """Taken."""
+for name in ("Rope", "Latch", "PID", "Sensor", "Controller"):
+    with pytest.raises(ModelError, match=f"the class {name} of .*give your own class another name"):
+        type(name, (BodyForce,), {})
+Rolling = element(type("Rolling", (BodyForce,), {"__annotations__": {}}))
+from flyball.statics import replacement_joints
+"""
+
+
+def test_a_name_of_flyballs_own_is_refused():
+    """In a new process, which has not imported most of them; names that model files cannot have are free."""
+    done = subprocess.run([sys.executable, "-c", TAKEN], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def variant(**formulas):
@@ -418,6 +434,95 @@ BROKEN = {
 def test_a_wrong_class_is_caught_by_the_part_that_it_breaks(part):
     with pytest.raises(ContractError, match=rf"Variant 'air' fails the check '{part}': "):
         check_element(breaking(**BROKEN[part])("air", "puck", coefficient=0.8))
+
+
+def with_a_torque(par, F, M, laws, values):
+    d = sub(M[0], F[0])
+    return scale(-par[0], d), scale(par[0], d)
+
+
+def off_the_line(par, F, M, laws, values):
+    o = 0.0 * par[0]
+    return scale(-par[0], sub(M[3], F[3])), (o, o, o)
+
+
+def along_an_axis_of_the_body(par, F, M, laws, values):
+    o = 0.0 * par[0]
+    return scale(par[0], (M[1][0], M[1][3], M[1][6])), (o, o, o)
+
+
+@pytest.mark.parametrize(
+    ("wrench", "role", "why"),
+    [
+        (with_a_torque, "M", "exerts a torque about the origin of frame M"),
+        (with_a_torque, "F", "exerts a torque about the origin of frame F"),
+        (off_the_line, "M", ""),
+        (off_the_line, "F", "exerts a torque about the origin of frame F"),
+        (along_an_axis_of_the_body, "M", "depends on the orientation or angular velocity of frame M"),
+    ],
+)
+def test_a_force_between_two_points_makes_no_torque_on_a_point_mass(wrench, role, why):
+    """A point mass would not turn; a body with inertia does."""
+    members = {"__module__": __name__, "__annotations__": {}, "wrench": staticmethod(wrench)}
+    cls = element(type("Between", (CubicSpring,), members | {"conservative": lambda self: False}))
+    with pytest.raises(
+        ContractError, match=r"Between 's' fails the check 'points': wrench.* derive the class from Two"
+    ):
+        check_element(cls("s", "a", "b", stiffness=1))
+    for inertia in (0, (1, 1, 1)):
+        m = fb.Mechanism("pair")
+        m.add(fb.Body("p", mass=1, inertia=inertia, position=(1, 0, 0)))
+        m.add(cls("s", *(("ground", "p") if role == "M" else ("p", "ground")), stiffness=1))
+        if why and inertia == 0:
+            with pytest.raises(fb.ModelError, match=rf"Between 's': its wrench {why}, but Body 'p' has no inertia"):
+                m.simulate(0.1)
+        else:
+            m.simulate(0.1, outputs=2)
+
+
+@element
+class Aligner(TwoFrameForce):
+    """A torque k x_M x x_F that turns the x axes of two frames towards each other, and a force k (F - M)."""
+
+    torsional_stiffness: Annotated[Number, Unit("N*m")] = 0.0
+
+    @staticmethod
+    def wrench(par, F, M, laws, values):
+        return scale(par[0], sub(F[0], M[0])), scale(par[0], cross(col(M[1], 0), col(F[1], 0)))
+
+    def parameters(self, n, separation):
+        return (n.torsional_stiffness,)
+
+
+@both_layers
+def test_a_force_between_two_frames_at_a_point():
+    """About a hinge through the point it is a torsional spring: an angular frequency sqrt(k / J)."""
+    m = fb.Mechanism("needle", planar=True)
+    m.add(fb.Body("needle", mass=1, inertia=0.2, position=(1, 2)))
+    m.add(fb.Revolute("A", "ground", "needle", at=(1, 2)))
+    m.add(Aligner("e", "ground", "needle", at=(1, 2), torsional_stiffness=5))
+    found = m.linearize(about=m.equilibrium()).eigenvalues
+    np.testing.assert_allclose(np.sort(found.imag), [-5, 5], rtol=1e-9)
+    check_element(Aligner("e", "a", "b", at=(0, 0, 0), torsional_stiffness=5), skip=("turned", "units"))
+
+
+def test_points_without_frames_are_refused():
+    @element
+    class Sling(CoordinateForce):
+        """A force along the distance of two points, whose class does not place them."""
+
+        at: PointPair | None = None
+
+        def ends(self):
+            return {"F": "ground", "M": "b"}
+
+        def path(self):
+            return (("F", "M", blocks.DISTANCE),)
+
+    m = fb.Mechanism("sling")
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)))
+    with pytest.raises(fb.ModelError, match=r"Sling 's': 'at' is given, and Sling has no placed\(n, planar\)"):
+        m.add(Sling("s", at=((0, 0, 1), (0, 0, 0))))
 
 
 # -- joints

@@ -334,6 +334,21 @@ def test_a_wrong_row_is_caught_by_the_part_that_it_breaks(part):
         check_element(kind("guide", "rail", "bead", a=2, b=1))
 
 
+def test_a_row_that_turns_a_point_mass_is_refused():
+    """The row of an ellipse exerts a torque on the body that carries the ellipse, whatever it declares."""
+    kind = joint(own("Own", ellipse, points="FM")("xy"), constants=lambda self, n, row, F, M: (2.0, 1.0))
+    with pytest.raises(
+        ContractError, match=r"fails the check 'points': row.*exerts a torque about the origin of frame F"
+    ):
+        check_element(kind("guide", "rail", "bead"))
+    m = fb.Mechanism("ring", planar=True)
+    m.add(fb.Body("ring", mass=1, inertia=0, position=(2, 0)), fb.Frame("pin", "ground"), kind("guide", "ring", "pin"))
+    with pytest.raises(
+        fb.ModelError, match=r"Guide 'guide': row Own exerts a torque .*frame F, but Body 'ring' has no in"
+    ):
+        m.simulate(0.1)
+
+
 def test_a_torque_that_is_forgotten_is_found():
     kind = joint(own("Own", no_torque)("xy"), constants=lambda self, n, row, F, M: (2.0, 1.0))
     with pytest.raises(ContractError, match="fails the check 'gradient'"):

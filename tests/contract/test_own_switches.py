@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switches.guard_kinds import G_HOLDS, OFF
+from flyball.constraints.switches.guard_kinds import G_HOLDS, G_UPPER, OFF
 from flyball.constraints.switches.switch_kind import ANY_FORCE, INTERVAL
 from flyball.elements import Number, ProblemRow, Switch, SwitchKind, Unilateral, element
 from flyball.model.element import Element
 from flyball.numerics.complementarity.dense_problem import AT_REST, BILATERAL, FRICTION_LINE
+from flyball.testing import ContractError, check_element
 
 
 class CatchKind(SwitchKind):
@@ -44,7 +45,7 @@ CATCH = CatchKind(
 
 
 @element
-class Catch(Unilateral):
+class Magnet(Unilateral):
     """A magnetic catch at zero: it takes what comes slower than ``speed``, and holds it up to a force."""
 
     coordinate: str = field(kw_only=False)
@@ -68,7 +69,7 @@ class Catch(Unilateral):
 @pytest.fixture(autouse=True, scope="module")
 def forgotten():
     yield
-    for name in ("Catch", "Hook"):
+    for name in ("Magnet", "Hook", "Printer", "Bolt"):
         Element.registry.pop(name, None)
         Element.modules.pop(name, None)
 
@@ -77,7 +78,7 @@ def run(coordinates, pull, **catch):
     m = fb.Mechanism("door", planar=True)
     m.add(fb.Body("b", mass=1.0, inertia=0.1, position=(0.0, 0.0), velocity=(-0.5, 0.0)))
     m.add(fb.Prismatic("P", "ground", "b", at=(-1.0, 0.0), axis=(1.0, 0.0), displacement=1.0))
-    m.add(fb.Actuator("pull", "P.displacement", force=pull), Catch("catch", "P.displacement", **catch))
+    m.add(fb.Actuator("pull", "P.displacement", force=pull), Magnet("catch", "P.displacement", **catch))
     return m.simulate(4.0, coordinates=coordinates, outputs=401)
 
 
@@ -97,6 +98,62 @@ def test_fast_ones_pass():
     r = run("joint", "0", speed=0.4)
     assert not len(r.events)
     assert r["b"].velocity[-1, 0] == pytest.approx(-0.5)
+
+
+def test_the_contract_covers_motions_and_the_guard():
+    assert {"guard", "file", "books", "layers"} <= set(check_element(Magnet("catch", "P.displacement", speed=0.1)))
+
+
+class PrinterKind(CatchKind):
+    """Its guard gives in Python what no compiled code can."""
+
+    @staticmethod
+    def guard(mode, way, x, rate, force, numbers, units):
+        return float(f"{x:.17g}")
+
+
+@element
+class Printer(Magnet):
+    """A catch with such a guard."""
+
+    def switches(self):
+        return (Switch(PrinterKind(**vars(CATCH)), along=self.along(), weighted=True),)
+
+
+def test_a_guard_that_cannot_be_compiled_breaks_the_contract():
+    with pytest.raises(ContractError, match=r"Printer 'catch' fails the check 'guard': .*cannot be compiled"):
+        check_element(Printer("catch", "P.displacement"))
+
+
+def test_at_rest_a_kind_must_say_whether_it_holds():
+    m = fb.Mechanism("door", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=0.1, position=(0.0, 0.0)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(0.0, 0.0), axis=(1.0, 0.0)), Magnet("catch", "P.displacement"))
+    with pytest.raises(
+        fb.ModelError, match=r"Magnet 'catch': CatchKind does not say .*; define push_direction\(self, x, "
+    ):
+        m.equilibrium()
+
+
+@element
+class Bolt(Magnet):
+    """A latch whose event function is the distance from a bound."""
+
+    def switches(self):
+        kind = CatchKind(**(vars(CATCH) | {"guards": (G_UPPER,), "numbers": ("upper", "strength")}))
+        return (Switch(kind, along=self.along(), weighted=True),)
+
+
+def test_a_start_beyond_the_bound_of_a_guard_is_refused():
+    m = fb.Mechanism("door", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=0.1, position=(0.0, 0.0), velocity=(0.5, 0.0)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(-1.0, 0.0), axis=(1.0, 0.0), displacement=1.5))
+    m.add(Bolt("bolt", "P.displacement", speed=1.0))
+    said = (
+        r"Bolt 'bolt': the motion starts beyond it: .*P.displacement is 1.5 m and must be at most 1 m; change the start"
+    )
+    with pytest.raises(fb.ModelError, match=said):
+        m.simulate(1.0)
 
 
 class HookKind(SwitchKind):
@@ -120,7 +177,7 @@ HOOK = HookKind(guards=(G_HOLDS,), forces=ANY_FORCE, role="is held", closing=("h
 
 
 @element
-class Hook(Catch):
+class Hook(Magnet):
     """A hook that holds a coordinate at zero either way."""
 
     def switches(self):

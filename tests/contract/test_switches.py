@@ -13,6 +13,7 @@ import pytest
 
 import flyball as fb
 from flyball.forces import ALL, LIMITS
+from flyball.testing import CHECKS, check_element
 
 SECONDS = 8.0
 PUSH, PHASE = 3.0, 0.9  # amplitude [N] and phase of the force on the first block
@@ -59,20 +60,30 @@ ELASTIC: dict[str, Callable] = {
         "part", bodies=("ground", "b"), at=((-2 * L, 0.0), (0.0, 0.0)), length=2.5 * L, stiffness=50.0 * M / T**2
     ),
 }
+
+
+def sample(name: str) -> Callable:
+    return ELASTIC[name.partition(" ")[2]] if name.startswith("elastic") else SAMPLES[name][0]
+
+
 SI: Scales = (1.0, 1.0, 1.0)
 OTHER: Scales = (2.0**10, 2.0**-8, 2.0**-6)
 
 
 def blocks(part: Callable, scales: Scales = SI) -> fb.Mechanism:
     """Two blocks on slides, the first with a periodic force and the element."""
+    m = pushed_blocks(scales)
+    m.add(part(*scales))
+    return m
+
+
+def pushed_blocks(scales: Scales = SI) -> fb.Mechanism:
     L, M, T = scales
     m = fb.Mechanism("blocks", planar=True)
     for body, joint in (("b", "P"), ("c", "Q")):
         m.add(fb.Body(body, mass=BLOCKS[body] * M, inertia=0.1 * M * L**2, position=(0.0, 0.0)))
         m.add(fb.Prismatic(joint, "ground", body, at=(0.0, 0.0), axis=(1.0, 0.0)))
-    m.add(
-        fb.Actuator("push", "P.displacement", force=f"{PUSH * M * L / T**2}*sin({1.0 / T}*t + {PHASE})"), part(*scales)
-    )
+    m.add(fb.Actuator("push", "P.displacement", force=f"{PUSH * M * L / T**2}*sin({1.0 / T}*t + {PHASE})"))
     return m
 
 
@@ -126,6 +137,14 @@ def test_elastic_ones(name, coordinates):
     assert abs(r.energy.balance).max() < 1e-6
     carried = pull(r) if name == "Rope" else r["part"].force
     assert force_on(r)["b"] == pytest.approx(carried, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [*SAMPLES, *(f"elastic {x}" for x in ELASTIC)])
+def test_they_keep_the_contract(name):
+    """In bodies that tumble; a pin starts at rest, the rope of the sample is planar."""
+    e = sample(name)(*SI)
+    own = pushed_blocks() if name.endswith(("ShearPin", "Rope")) else None
+    assert check_element(e, mechanism=own) == list(CHECKS[e.category])
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
@@ -182,7 +201,7 @@ def test_new_pin():
 @pytest.mark.parametrize("name", [*SAMPLES, *(f"elastic {x}" for x in ELASTIC)])
 def test_other_units(name):
     """The same events at the same instants, and the same motion, in units of which the first are powers of two."""
-    make = ELASTIC[name.partition(" ")[2]] if name.startswith("elastic") else SAMPLES[name][0]
+    make = sample(name)
     one, two = run(make, "joint"), run(make, "joint", OTHER)
     L, _, T = OTHER
     assert [(x.kind, x.name) for x in one.events] == [(x.kind, x.name) for x in two.events]

@@ -146,6 +146,12 @@ SPATIAL = [
     (
         fb.Universal,
         ("U", "a", "b"),
+        {"at": (0, 0, 0), "axes": ((0, 0, 1),)},
+        r"'axes' must be a list of 2, got \(\(0, 0",
+    ),
+    (
+        fb.Universal,
+        ("U", "a", "b"),
         {"at": (0, 0, 0), "axes": ((1, 0, 0), (1, 1, 0))},
         "must be at right angles, these are at 45 deg",
     ),

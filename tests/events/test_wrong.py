@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flyball as fb
@@ -37,9 +38,19 @@ def test_conditions(when, error, said):
         arm(fb.Event("e", when))
 
 
-@pytest.mark.parametrize("when", ["A.angle > 90 deg", "A.angle < (90 deg)/2", "a.x > 200 mm", "60 rpm < A.angle_rate"])
-def test_units_that_fit(when):
-    arm(fb.Event("e", when))
+@pytest.mark.parametrize(
+    ("when", "what", "limit"),
+    [
+        ("A.angle < -30 deg", "A.angle", -np.pi / 6),
+        ("A.angle < (-90 deg)/2", "A.angle", -np.pi / 4),
+        ("a.x < 500 mm", "a.x", 0.5),
+        ("20 rpm < -A.angle_rate", "A.angle_rate", -2 * np.pi / 3),
+    ],
+)
+def test_units_that_fit(when, what, limit):
+    """The arm falls from the horizontal; the event is where the quantity has that value in SI units."""
+    r = arm(fb.Event("e", when, do=[fb.Stop()])).simulate(2.0)
+    assert r[what][-1] == pytest.approx(limit, rel=1e-6)
 
 
 @pytest.mark.parametrize(

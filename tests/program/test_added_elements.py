@@ -73,7 +73,6 @@ from ..compiler.formulas import formula
 from ..math.vec import scale
 from ..model.element import Damping, element
 from ..model.force import BodyForce
-from .point_force import inputs
 
 KIND = {kind}
 
@@ -92,7 +91,6 @@ class Drag(BodyForce):
     coefficient: Damping = 0.0
 
     kind: ClassVar[int] = KIND
-    inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

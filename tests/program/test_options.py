@@ -19,6 +19,12 @@ from flyball.analysis_options import Options
 from flyball.cli import app
 from flyball.cli.options import argument_help, first_doc_line
 from flyball.mechanism_methods import DesignMethods, MobilityMethods, MotionMethods, StaticsMethods
+from flyball.numerics.integrators.butcher_tableaux import TABLEAUX
+from flyball.sensitivity import sensitivity
+from flyball.simulation.method_choice import AUTO_METHOD, IMPLICIT_METHODS, IMPULSE_METHOD
+from flyball.studies import study
+from flyball.studies.sampling import LISTED_DESIGNS, SAMPLED_DESIGNS
+from flyball.symbolic.export.code import LANGUAGES
 
 FAMILIES = (MotionMethods, StaticsMethods, DesignMethods, MobilityMethods)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}
@@ -75,6 +81,26 @@ def test_every_argument_of_a_method_is_a_field_and_has_its_line(name):
         if t.choices and isinstance(asked[k].default, str):
             assert asked[k].default in t.choices
     assert "Returns\n-------" in inspect.getdoc(method)
+
+
+METHODS_OF_INTEGRATION = {*TABLEAUX, *IMPLICIT_METHODS, IMPULSE_METHOD, AUTO_METHOD}
+CHOICES = {  # method and argument -> the registry of what it accepts
+    ("simulate", "method"): METHODS_OF_INTEGRATION,
+    ("study", "method"): METHODS_OF_INTEGRATION,
+    ("compare", "method"): set(TABLEAUX),
+    ("study", "analysis"): set(study.ANALYSES),
+    ("study", "design"): {*LISTED_DESIGNS, *SAMPLED_DESIGNS},
+    ("sensitivity", "analysis"): set(sensitivity.ANALYSES),
+    ("optimize", "analysis"): set(sensitivity.ANALYSES),
+    ("export", "language"): set(LANGUAGES),
+}
+
+
+@pytest.mark.parametrize(("name", "argument"), CHOICES)
+def test_the_choices_of_an_argument_are_those_of_its_registry(name, argument):
+    """The help of the command line and the documentation are made from the docstring."""
+    described = argument_help(getattr(fb.Mechanism, name))[argument]
+    assert set(described.choices) == CHOICES[name, argument]
 
 
 def test_mechanisms_have_every_method_with_its_signature():

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.cli import app
+from flyball.studies.study import ANALYSES
 from tests.study.rigs import oscillator
 
 K = np.array([50.0, 100.0, 400.0])
@@ -85,6 +86,33 @@ def test_an_instant_and_kinematics():
     assert m.kinematics(**s.question(4))["crank.x"].tobytes() == s.values["crank.x"][4].tobytes()
     m.drivers.clear()
     assert "under-driven" in m.study({"l": [1.0]}, ["crank.x"], analysis="kinematics", t_end=1.0).reasons[0]
+
+
+def damped(k, t=0.5):
+    """Position of the pan that is let go where the spring is unloaded: 2 kg, 0.5 N s/m."""
+    d, w = 0.125, np.sqrt(k / 2.0 - 0.125**2)
+    return -2.0 * 9.81 / k * (1.0 - np.exp(-d * t) * (np.cos(w * t) + d / w * np.sin(w * t)))
+
+
+AT_THE_END = {"t_end": 0.5, "outputs": 2, "rtol": 1e-10}
+SAMPLES = {  # analysis -> a result, options, and its closed form
+    "motion": ("pan.y", AT_THE_END, damped),
+    "kinematics": ("pan.y", {"t_end": 0.5, "outputs": 2}, lambda k: 1e-3 * k * 0.5**2),
+    "instant": ("pan.ay", {}, lambda k: -9.81 + 0.0 * k),
+    "equilibrium": ("pan.y", {}, lambda k: -2.0 * 9.81 / k),
+    "modes": ("omega[0]", {"about": "equilibrium"}, lambda k: np.sqrt(k / 2.0)),
+    "linearize": ("abscissa", {"about": "equilibrium"}, lambda k: -0.125 + 0.0 * k),
+}
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_every_analysis_gives_its_closed_form(analysis):
+    of, options, exact = SAMPLES[analysis]
+    m = hanging()
+    if analysis == "kinematics":
+        m.add(fb.Driver("lift", "pan.y", "1e-3*k*t**2"))
+    s = m.study({"k": K}, [of], analysis=analysis, **options)
+    np.testing.assert_allclose(s[of].reshape(len(K), -1)[:, -1], exact(K), rtol=1e-8)
 
 
 def test_functions_of_the_mechanism():

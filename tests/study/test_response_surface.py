@@ -27,4 +27,7 @@ def test_what_else_varies_is_averaged():
 
 def test_samples_on_a_line_are_drawn_as_points():
     s = oscillator().study({"k": [1.0, 2.0, 3.0], "mass": [1.0, 2.0, 3.0]}, ["end(b.x)"], t_end=0.01, design="list")
-    s.plot().canvas.draw()
+    figure = s.plot()
+    figure.canvas.draw()
+    (points,) = figure.axes[0].collections
+    assert points.get_offsets().tolist() == [[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]

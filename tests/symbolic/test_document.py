@@ -236,6 +236,7 @@ def test_a_body_on_a_ball_joint_has_a_constant_mass_matrix():
     eq = m.symbolic(coordinates="joint")
     assert eq.M.texts() == [["I + m*l^2", "0", "0"], ["0", "I + m*l^2", "0"], ["0", "0", "I"]]
     assert eq.f.texts() == ["m*l^2*O.w_y*O.w_z", "-m*l^2*O.w_x*O.w_z", "0"]
+    assert [eq.symbol(name).data.unit for name in ("O.w_x", "O.w_x'")] == ["rad/s", "rad/s^2"]
 
 
 def test_matrices_stand_in_brackets_and_have_a_head():

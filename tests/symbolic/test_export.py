@@ -9,7 +9,8 @@ import pytest
 
 import flyball as fb
 from flyball.expression_graph.evaluation import evaluate, jacobian
-from tests.symbolic.exported import close, example, given_at, rubbing, states
+from flyball.symbolic.export.code import LANGUAGES
+from tests.symbolic.exported import Library, close, example, given_at, rubbing, states
 
 
 def call(code, name, given):
@@ -102,6 +103,27 @@ def test_the_python_module_runs_without_flyball(tmp_path):
     *numbers, name = out.stdout.split()
     close([float(x) for x in numbers], code["right_hand_side"](0.0, code.start["q"], code.start["v"])[1])
     assert name == code.names["q"][0]
+
+
+def pendulum_in(code, folder, state):
+    """Acceleration by the exported code of any language."""
+    if code.language == "c":
+        return Library(code, folder)("right_hand_side", **state)["vdot"]
+    found = call(code, "right_hand_side", state)[1]
+    return found.full() if code.language == "casadi" else found
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_language_computes_a_pendulum(language, tmp_path):
+    """theta'' = -3/2 g/l sin(theta), theta from below, here the angle from the horizontal."""
+    if language == "casadi":
+        pytest.importorskip("casadi")
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -10))
+    m.add(fb.Body("rod", mass=3, inertia=0.25, position=(0.5, 0)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    code = m.export(tmp_path, language=language, functions=["right_hand_side"], coordinates="joint")
+    state = {"t": 0.0, "q": np.array([0.3]), "v": np.array([0.7]), "p": np.array([])}
+    found = pendulum_in(code, tmp_path, {a.name: state[a.name] for a in code.routines[0].arguments})
+    assert np.ravel(found) == pytest.approx([-15 * np.cos(0.3)], rel=1e-12)
 
 
 def test_numba(tmp_path):

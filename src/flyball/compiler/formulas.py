@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
-from weakref import WeakValueDictionary
+from weakref import WeakSet, WeakValueDictionary
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,6 +36,7 @@ FIRST_ADDRESS = 1 << 16
 CODE_TABLES: WeakValueDictionary[int, Any] = WeakValueDictionary()
 """The `kernels.CodeTable` at an address, as long as it exists."""
 _formulas: list[Callable[..., Any]] = []
+_marked: WeakSet[Callable[..., Any]] = WeakSet()
 _callbacks: list[Callable[[], None]] = []
 _numba_overload: list[Any] = []  # `numba_target.overload`, once something is compiled
 
@@ -43,6 +44,7 @@ _numba_overload: list[Any] = []  # `numba_target.overload`, once something is co
 def formula(function: F) -> F:
     """Let compiled code call ``function``; the function itself stays plain Python and accepts any numbers."""
     _formulas.append(function)
+    _marked.add(function)
     _register_waiting()
     return function
 
@@ -332,6 +334,8 @@ def dispatch_by_kind(
     ``otherwise`` is the result for an unknown kind: nan, so that the formula of another element is never used. With a
     ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called.
     """
+    if unmarked := [f"{f.__module__}.{f.__name__}" for f in cases.values() if f not in _marked]:
+        raise RuntimeError(f"compiled code cannot call {', '.join(unmarked)}: put the decorator @formula above it")
     names: dict[str, Any] = {f"{_formula_name(f)}_{kind}": f for kind, f in sorted(cases.items())}
     lines = []
     for called, kind in zip(names, sorted(cases), strict=True):

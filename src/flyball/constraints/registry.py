@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
+from ..compiler.formulas import formula
 from ..compiler.kernels import Signature
 
 FRAME = (3, 9, 3, 3, 3, 3)
@@ -33,6 +34,12 @@ SIGNATURES = (
     ),
 )
 """The formula of a user-defined constraint row: `blocks.ConstraintRow`."""
+
+
+@formula
+def no_inputs(par, F, M):
+    """Return zeros: the laws of a force between frames F and M have no inputs."""
+    return 0.0 * M[0][0], 0.0 * M[0][0]
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,10 @@ def ordered(found: list[Kind]) -> tuple[Kind, ...]:
     kinds = sorted(found, key=lambda k: k.number)
     for a, b in itertools.pairwise(kinds):
         if a.number == b.number:
-            raise RuntimeError(f"KIND {a.number} is taken twice: by {a.row.__module__} and {b.row.__module__}")
+            raise RuntimeError(
+                f"KIND {a.number} is taken twice: by {a.row.__module__} and {b.row.__module__}; the next free is "
+                f"{1 + max(k.number for k in kinds)}"
+            )
         if b.often and not a.often:
             raise RuntimeError(f"{b.row.__module__}: OFTEN is for the first kinds; {a.row.__module__} comes before it")
     if [k.number for k in kinds] != list(range(len(kinds))):

@@ -1,10 +1,9 @@
 """Force elements: one file each, found automatically. A new force is a new file here, and a line below for editors.
 
 ``KIND`` is the next number. ``inputs`` and ``wrench`` (or ``effort``), ``energy`` and all functions that they call
-carry `formula`, otherwise nothing of the engine can be compiled; a class with ``wrench`` needs ``inputs`` of its own,
-since those of its base class are for elements outside the package. ``placed`` returns its frames if it is given by
-points: `TwoPointForce` has one, with the world's axes; `TwoFrameForce` has none (pattern: `bushing`). ``on_points``
-returns whether it may act on a point mass. ``fails`` ends the message about a force that is no number: it says the
+carry `formula`; a class without ``inputs`` inherits zeros. ``placed`` returns its frames if it is given by points; the
+base classes have one, with the world's axes (pattern of another: `bushing`). ``on_points`` returns whether it may act
+on a point mass. ``fails`` ends the message about a force that is no number: it says the
 remedy. All compiled mechanics is compiled again. Samples in tests: ``contract/test_forces.py``, ``robust/forces.py``,
 and in the mechanisms with every force of ``contract/test_everything.py`` and ``identities/test_complex_values.py``.
 """
@@ -41,8 +40,13 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
     out: dict[int, Callable] = {}
     for c in elements:
         if (f := getattr(c, name, None)) is not None and out.setdefault(c.kind, f) is not f:
-            raise RuntimeError(f"kind {c.kind} is taken twice: by {out[c.kind].__module__} and {f.__module__}")
+            homes = f"{out[c.kind].__module__} and {c.__module__}"
+            raise RuntimeError(f"kind {c.kind} is taken twice: by {homes}; the next free is {_next_kind()}")
     return out
+
+
+def _next_kind() -> int:
+    return 1 + max(c.kind for c in _HERE if hasattr(c, "kind"))
 
 
 INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
@@ -64,7 +68,9 @@ SIGNATURES = (
 )
 """The formulas of forces that kernels call by address, in the order of their code tables."""
 if set(WRENCHES) & set(EFFORTS):
-    raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
+    raise RuntimeError(
+        f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}; the next free is {_next_kind()}"
+    )
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .backlash import Backlash as Backlash
     from .bushing import Bushing as Bushing

@@ -60,12 +60,6 @@ def branch(par, F, M):
 
 
 @formula
-def inputs(par, F, M):
-    """Return zeros: a bushing has no laws."""
-    return 0.0 * M[0][0], 0.0 * M[0][0]
-
-
-@formula
 def wrench(par, F, M, laws, values):
     """Return the wrench on M, along F's axes: force -K d - C ddot, torque -J^T K_r theta - C_r omega.
 
@@ -125,7 +119,6 @@ class Bushing(TwoFrameForce):
     torsional_damping: Annotated[PerAxis, Unit("N*m*s/rad")] = 0.0
 
     kind: ClassVar[int] = KIND
-    inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
     branch: ClassVar = staticmethod(branch)
     energy: ClassVar = staticmethod(energy)

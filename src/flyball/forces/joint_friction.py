@@ -8,8 +8,9 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from ..compiler.formulas import formula
+from ..constraints import displacement
 from ..constraints.switches.friction import FRICTION
-from ..errors import ModelError
+from ..errors import ModelError, warn_user
 from ..math.scalar import absolute, choose, exp, sqrt, tanh
 from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
@@ -61,6 +62,14 @@ def effort(par, x, rate, laws, load):
     v = par[0] * rate
     way = choose(laws[2] - SLIDING, 1.0, choose(par[CREEPS], tanh(v / par[4]), laws[2]))
     return -par[0] * coefficient(par, v, laws[2]) * (load + par[6]) * way - par[5] * rate
+
+
+def _slide_on_plane(joint: Joint, *coordinates: str) -> bool:
+    """Return whether coordinates are displacements along two axes of a joint that prevents that along the third."""
+    slides = [joint.coordinates[name].row for name in coordinates]
+    axes = {row.axes for row in slides if row.kind == displacement.KIND}
+    held = {row.axes for row in joint.blocks if row.kind == displacement.KIND}
+    return len(axes) == 2 and axes | held == set("xyz")
 
 
 @element
@@ -195,8 +204,16 @@ class JointFriction(CoordinateForce):
             self._examine_thread(model)
             return
         joint = model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
-        if joint.one_surface:
-            self._refuse_second(model, joint)
+        for other in self._other_directions(model):
+            if joint.one_surface:
+                raise ModelError(self._rectangle(other, joint))
+            if _slide_on_plane(joint, self._coordinate(), other._coordinate()):
+                warn_user(
+                    f"{self.title} and {other.title} act along two directions in one plane of {joint.title}, each as "
+                    f"if it were alone: together they give up to 1.4 mu N. If this is one surface, declare "
+                    f"one_surface: ClassVar[bool] = True in {type(joint).__name__}, and use one friction",
+                    UserWarning,
+                )
 
     def _examine_thread(self, model: Model) -> None:
         """Require a screw, and a load that counts the thread's normal force."""
@@ -209,22 +226,20 @@ class JointFriction(CoordinateForce):
                 f"are the normal force of the thread, which counts already; leave it out"
             )
 
-    def _refuse_second(self, model: Model, joint: Joint) -> None:
-        """Refuse friction along two coordinates of one surface: its limit would be a rectangle, not a circle."""
-        for other in model.forces:
-            if (
-                isinstance(other, JointFriction)
-                and other.name != self.name
-                and other.joint == self.joint
-                and other._coordinate() != self._coordinate()
-            ):
-                raise ModelError(
-                    f"{self.title}: {other.title} already acts on the surface of {joint.title}, along "
-                    f"{other.coordinate_text()!r}. One surface has one friction force, mu N against its total slip "
-                    "velocity; two would together give up to 1.4 mu N. Leave one out, give the bodies shapes and a "
-                    "Contact(friction=...) in place of the joint, or put a body between them with a joint for each "
-                    "motion, if these are two surfaces"
-                )
+    def _other_directions(self, model: Model) -> list[JointFriction]:
+        """Return the frictions along other coordinates of the same joint."""
+        same = [f for f in model.forces if isinstance(f, JointFriction) and f.joint == self.joint]
+        return [f for f in same if f.name != self.name and f._coordinate() != self._coordinate()]
+
+    def _rectangle(self, other: JointFriction, joint: Joint) -> str:
+        """Return why friction along two coordinates of one surface is refused: its limit would be no circle."""
+        return (
+            f"{self.title}: {other.title} already acts on the surface of {joint.title}, along "
+            f"{other.coordinate_text()!r}. One surface has one friction force, mu N against its total slip "
+            "velocity; two would together give up to 1.4 mu N. Leave one out, give the bodies shapes and a "
+            "Contact(friction=...) in place of the joint, or put a body between them with a joint for each "
+            "motion, if these are two surfaces"
+        )
 
     def check(self, n: SimpleNamespace) -> None:
         """Require valid coefficients and lengths."""

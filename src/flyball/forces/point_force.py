@@ -16,12 +16,6 @@ KIND = 3
 
 
 @formula
-def inputs(par, F, M):
-    """Return zeros: nothing is measured."""
-    return 0.0 * M[0][0], 0.0 * M[0][0]
-
-
-@formula
 def in_world(par, F, M, laws):
     """Return the laws as components along the world's axes, or along the body's if par[0] says so."""
     if par[0].real > 0.5:
@@ -66,7 +60,6 @@ class PointForce(BodyForce):
     axes: Literal["world", "body"] = "world"
 
     kind: ClassVar[int] = KIND
-    inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
     symbol: ClassVar[str] = "arrow"
 

@@ -10,7 +10,7 @@ from ..errors import ModelError
 from ..model.element import Law, LawOf, Laws, element
 from ..model.force import BodyForce
 from ..model.joint import WorldFrame
-from .point_force import components, in_world, inputs
+from .point_force import components, in_world
 
 KIND = 4
 
@@ -42,7 +42,6 @@ class PointTorque(BodyForce):
     axes: Literal["world", "body"] = "world"
 
     kind: ClassVar[int] = KIND
-    inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:

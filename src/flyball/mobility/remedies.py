@@ -6,9 +6,9 @@ where the blocks Z^T N_e of its elements, stacked, are square and regular: as ma
 vectors, and no vector remains. Since all new rows lie in the span of the old ones, the same motions are allowed as
 before. All this must hold here and in nearby positions.
 
-Sets that share elements are treated one after the other, each together with those before. The cheapest choice is found
-by branch and bound. Which kinds of joints can be replacements, and at what cost, is given by class attributes
-(``replaceable``, ``stand_in``, ``omission``, ``called``).
+Sets that share elements are treated one after the other, each together with those before; if some then have no remedy,
+once more with these first. The cheapest choice is found by branch and bound. Which kinds of joints can be replacements,
+and at what cost, is given by class attributes (``replaceable``, ``stand_in``, ``omission``, ``called``).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from ..model.element import Element, resolve
 from ..model.force import CoordinateForce
 from ..model.geometry import triad, vector
 from ..model.joint import Coupling, Joint
+from ..model.messages import kind_in_words
 from ..model.model import Model
 from ..numerics.rank import column_space, fundamental_subspaces, null_space
 from ..results.mobility import JointChange, Remedy
@@ -211,7 +212,7 @@ def possible_replacements(
     out = {}
     for name in names:
         e = model[name]
-        kind = type(e).__name__.lower()
+        kind = kind_in_words(type(e))
         out[name] = [Replacement(JointChange(name, kind, joint), joint.stand_in, rows[k]) for k, joint in found[name]]
         if not _used_coordinates(model, e):
             nothing = ElementRows(rows[name].columns, rows[name].values[:, :0])
@@ -335,10 +336,21 @@ def find_remedies(
     out: dict[int, RemedySearch] = {}
     for group in _sets_with_common_elements(sets):
         names = list(dict.fromkeys(name for k in group for name in sets[k]))
-        tangle = CoupledSets({n: rows[n] for n in names}, tried)
-        for k in group:
-            out[k] = tangle.remedy_for(sets[k], budget)
+        own = {n: rows[n] for n in names}
+        found = _remedies_in_order(group, sets, CoupledSets(own, tried), budget)
+        if failed := [k for k in group if found[k].cure is None and not found[k].here_only]:
+            order = [*failed, *(k for k in group if k not in failed)]
+            again = _remedies_in_order(order, sets, CoupledSets(own, tried), budget)
+            found = min(found, again, key=lambda x: sum(search.cure is None for search in x.values()))
+        out |= found
     return [out[k] for k in range(len(sets))]
+
+
+def _remedies_in_order(
+    order: Sequence[int], sets: Sequence[tuple[str, ...]], coupled: CoupledSets, budget: SearchBudget
+) -> dict[int, RemedySearch]:
+    """Return the remedies of sets in this order: a choice for one limits the choices for those after it."""
+    return {k: coupled.remedy_for(sets[k], budget) for k in order}
 
 
 def _sets_with_common_elements(sets: Sequence[tuple[str, ...]]) -> list[list[int]]:

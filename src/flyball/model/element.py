@@ -171,6 +171,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     if any(k >= len(known) for k in late):
         has = f"it has {len(known)}: {', '.join(known)}" if known else "it has none"
         return f"{kind}: {len(args)} values are given for its fields; {has}"
+    short: dict[str, int] = {}  # field -> length of the list that it must be
     wrong: dict[str, list[str]] = {}  # field -> permitted types: a union reports one error for each member
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
@@ -179,6 +180,8 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         if e["type"] == "unexpected_keyword_argument":
             hint = getattr(cls, "hints", {}).get(where) or f"its fields are {', '.join(known)}"
             lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; {hint}")
+        elif e["type"] == "missing" and isinstance(e["loc"][-1], int) and len(e["loc"]) > 1:  # the end of a list
+            short[where] = max(short.get(where, 0), e["loc"][-1] + 1)
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             if where not in by_place:
                 lines.append(f"field {where!r} is missing")
@@ -194,7 +197,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         else:
             message = e["msg"].removeprefix("Value error, ")
             lines.append(f"field {where!r}: {message} (got {_short(e['input'])})")
-    for where, wanted in wrong.items():
+    for where, wanted in [*wrong.items(), *((k, [f"a list of {n}"]) for k, n in short.items() if k not in wrong)]:
         value = kwargs.get(where, dict(zip(known, args, strict=False)).get(where))
         lines.append(f"field {where!r} must be {' or '.join(dict.fromkeys(wanted))}, got {value!r}")
     return f"{who}: " + "; ".join(dict.fromkeys(lines))
@@ -237,12 +240,15 @@ class Element:
     _: KW_ONLY
 
     category: ClassVar[str] = "elements"
+    in_files: ClassVar[bool] = True  # whether model files may name it; its name is then in the registry
     registry: ClassVar[dict[str, type[Element]]] = {}
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        other = Element.registry.get(cls.__name__)
+        if not cls.in_files:
+            return
+        other = Element.registry.get(cls.__name__) if _is_built_in(cls) else _registered(cls.__name__)
         if other is not None and _is_built_in(other) != _is_built_in(cls):
             raise ModelError(
                 f"the class {cls.__name__} of {cls.__module__} and that of {other.__module__} have the same name, and "
@@ -297,6 +303,13 @@ class Element:
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Return the weights of the coordinates in the sum along which such a row acts; 1 each if not given."""
         return ()
+
+
+def _registered(name: str) -> type[Element] | None:
+    """Return the class of that name, even if it is one of flyball that has not been imported yet."""
+    if name not in Element.registry:
+        getattr(sys.modules["flyball"], name, None)  # imports the module that defines it
+    return Element.registry.get(name)
 
 
 def _is_built_in(cls: type) -> bool:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
+from ..constraints.registry import no_inputs
 from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
 from .element import Element, Law, Point, PointPair, nonnegative, positive
@@ -71,13 +72,11 @@ class Force(Element):
         return ""
 
     def on_points(self) -> bool:
-        """Return whether it depends only on the origins of its frames, and makes no torque about them."""
+        """Return whether it depends only on the origins of its frames, and makes no torque about them.
+
+        It may then act on point masses; a user-defined formula is checked (`tables.point_formulas`).
+        """
         return False
-
-
-def no_inputs(par, F, M):  # type: ignore[no-untyped-def]
-    """Return zeros: laws have no inputs."""
-    return 0.0 * M[0][0], 0.0 * M[0][0]
 
 
 @dataclass(frozen=True)
@@ -119,6 +118,13 @@ class TwoFrameForce(Force):
     def ends(self) -> dict[str, str]:
         """F on ``body_i``, M on ``body_j``."""
         return {"F": self.body_i, "M": self.body_j}
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Both frames at the point, with the world's axes."""
+        if n.at is None:
+            return None
+        p = vector(n.at, planar, f"'at' of {self.title}")
+        return {"F": (p, np.eye(3)), "M": (p, np.eye(3))}
 
 
 @dataclass(frozen=True)

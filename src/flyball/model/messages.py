@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,11 @@ def shortened_list(names: Iterable[str], most: int = 60) -> str:
     if len(every) - len(kept) <= 3:
         return ", ".join(every)
     return f"{', '.join(kept)}, ... {every[-1]}"
+
+
+def kind_in_words(cls: type) -> str:
+    """Return the name of a class as words: ``point in plane``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", cls.__name__).lower()
 
 
 def abbreviated(text: str, most: int = 200) -> str:

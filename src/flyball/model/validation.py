@@ -93,7 +93,11 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
     elif isinstance(e, Unilateral):
         e.check_range(n, model.unit(e.along()[0], e))
     elif isinstance(e, Force):
-        e.placed(n, model.planar)
+        placed = e.placed(n, model.planar)
+        if placed is None and getattr(n, "at", None) is not None and not isinstance(e, BodyForce):
+            raise ModelError(
+                f"{e.title}: 'at' is given, and {type(e).__name__} has no placed(n, planar) for its frames"
+            )
         if isinstance(e, TwoFrameForce) and n.at is None:
             check_by_frames(model, e)
     elif isinstance(e, Initial):

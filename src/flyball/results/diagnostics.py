@@ -367,7 +367,7 @@ def impulse_stepping_doubts(result: Result) -> tuple[str, ...]:
     what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
     text = (
         f"impulse time stepping itself {what} {lost:.2g} J (energy.numerical_loss), "
-        f"{100.0 * lost / moved:.2g} per cent of the energy moved: take shorter steps, "
+        f"{100.0 * lost / moved:.3g} per cent of the energy moved: take shorter steps, "
         f"method=fb.Stepping(step=...)"
     )
     return (text, *own)

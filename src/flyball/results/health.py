@@ -122,7 +122,7 @@ class ContactHealth:
                 "method=fb.Stepping(iterations=...)"
             )
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
-            part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"
+            part = f"{100.0 * self.worst_overlap / self.size:.3g} per cent of the smallest body"
             out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")
         if self.size > 0.0 and self.overlap_at_start > 1e-3 * self.size:
             out.append(

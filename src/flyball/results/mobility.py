@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..model.joint import Joint
+from ..model.messages import kind_in_words
 from ..model.model import Model
 
 MAX_BODIES = 12  # number of bodies in a line
@@ -142,7 +143,7 @@ class JointChange:
         """In words."""
         if self.by is None:
             return f"leave out {self.kind} {self.name!r}"
-        new = self.by.called or f"a {type(self.by).__name__.lower()} joint"
+        new = self.by.called or f"a {kind_in_words(type(self.by))} joint"
         axis = getattr(self.by, "axes", None) or self.by.axis
         along = "" if axis is None else f" with {'axes' if hasattr(self.by, 'axes') else 'axis'} {_axis_text(axis)}"
         return f"replace {self.kind} {self.name!r} by {new}{along}"
@@ -150,14 +151,14 @@ class JointChange:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Changes that remove redundant constraints without adding freedom; empty if those for earlier sets suffice."""
+    """Changes that remove redundant constraints without adding freedom; empty if those for other sets suffice."""
 
     changes: tuple[JointChange, ...]
 
     @property
     def text(self) -> str:
         """In words."""
-        return " and ".join(c.text for c in self.changes) or "the changes for the sets before do for this one too"
+        return " and ".join(c.text for c in self.changes) or "the changes for the other sets do for this one too"
 
     def applied(self, model: Model) -> Any:
         """Return a copy of the mechanism with the changes made."""
@@ -187,7 +188,7 @@ class RedundantSet:
     undetermined : dict
         Joint -> reaction components (world axes, on ``body_j``) that this leaves undetermined.
     cure : Remedy or None
-        What to replace or leave out; remedies of earlier sets are assumed to be applied.
+        What to replace or leave out; remedies of the other sets are assumed to be applied.
     cut : str
         If no remedy was found: extent of the search, if it was cut off.
     unit : str

@@ -162,6 +162,10 @@ def contact_rows(place: ContactState) -> np.ndarray:
 
 
 FLAT, EDGE, CORNER, BALL, DISK, ODD = "flat", "edge", "corner", "ball", "disk", "odd"
+FORM_WORDS = {
+    FLAT: "a flat face", EDGE: "an edge", CORNER: "a corner", BALL: "a sphere", DISK: "a circular rim",
+    ODD: "a surface of unknown curvature",
+}  # fmt: skip
 SHARP = (FLAT, EDGE, CORNER)
 SHAPE_TOLERANCE = 1e-6  # deviation of a unit vector, or relative to a shape, that counts as zero
 

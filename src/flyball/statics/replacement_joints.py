@@ -20,7 +20,7 @@ from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
 from ..constraints.switches.guard_kinds import STATIC
-from ..constraints.switches.switch_kind import INTERVAL
+from ..constraints.switches.switch_kind import INTERVAL, NO_ROW, SwitchKind
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
 from ..engine.entry_point import MOTION
@@ -45,6 +45,7 @@ from .closed_contacts import (
     CORNER,
     DISK,
     FLAT,
+    FORM_WORDS,
     SHARP,
     ContactState,
     StaticContact,
@@ -75,6 +76,7 @@ class ContactJoint(Joint):
     frames: tuple[tuple[float, ...], tuple[float, ...]]
     radii: tuple[float, float] = (0.0, 0.0)
 
+    in_files: ClassVar[bool] = False
     planar_normal: ClassVar[str] = "y"  # z is the normal of the contact
     symbol: ClassVar[str] = "point_in_plane"
 
@@ -146,6 +148,8 @@ FRICTION_ITERATIONS, FRICTION_TOLERANCE = (
 class HeldCoordinate(Coupler):
     """Constraint that keeps the weighted sum of one or more coordinates constant."""
 
+    in_files: ClassVar[bool] = False
+
     def check(self, n: Any) -> None:
         """Check nothing: the element that it replaces was checked."""
 
@@ -178,7 +182,7 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
     Raises
     ------
     ModelError
-        If an active element has no equivalent constraint.
+        If an active element has no equivalent constraint, or a user-defined kind does not say whether it holds.
     """
     out = ActiveConstraints()
     parts = [e for e in unsupported_elements(model) if e.switches()]
@@ -189,6 +193,7 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
     c.at(at.t, q, v)
     S = c.values.system
     for k, x in enumerate(c.structure.switches):
+        _refuse_undecided(x.element, x.switch.kind)
         value = float(c.work.sensed.value[x.measured])
         size = 1.0 if _is_rotation(model, x.element, x.switch) else c.values.length
         lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
@@ -201,6 +206,16 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
             elif x.switch.kind.forces == INTERVAL:
                 out.strengths[x.element.name] = float(S.switch_numbers.strength[k])
     return out
+
+
+def _refuse_undecided(e: Element, kind: SwitchKind) -> None:
+    """Refuse a user-defined kind with a row that does not define whether it holds at rest."""
+    user_defined = not type(kind).__module__.startswith("flyball.")
+    if user_defined and kind.forces != NO_ROW and type(kind).push_direction is SwitchKind.push_direction:
+        raise ModelError(
+            f"{e.title}: {type(kind).__name__} does not say whether it holds at rest; define push_direction(self, x, "
+            "bounds, near): 1, -1 or 0 (either way) where it holds, None where it is open"
+        )
 
 
 def _is_rotation(model: Model, e: Element, w: Switch) -> bool:
@@ -326,7 +341,7 @@ def _contact_joint(c: StaticContact, a: SurfaceForm, b: SurfaceForm, at: _Refere
     kind, centre, radii = _joint_kind(c.friction > 0.0, a, b)
     if kind is None:
         how = "sticking" if c.friction > 0.0 else "sliding"
-        return f"{c.name} is a {how} contact of what is {a.form} with what is {b.form} there"
+        return f"{c.name} is a {how} contact between {FORM_WORDS[a.form]} and {FORM_WORDS[b.form]}"
     axle = b.axle if b.form == DISK else up
     first = a.centre if kind is Centres and a.form == BALL else c.point
     second = c.point if centre is None else centre

@@ -111,7 +111,8 @@ def _coordinates(s: Structure, v: list[Symbol]) -> list[Symbol]:
 
 
 def _rate(p: Symbol, kind: str = "velocity") -> Symbol:
-    return Symbol(p.name + RATE, kind, _dotted(r"\dot", p.latex), f"{p.unit}/s", p.element)
+    unit = f"{p.unit}^2" if p.unit.endswith("/s") else f"{p.unit}/s"
+    return Symbol(p.name + RATE, kind, _dotted(r"\dot", p.latex), unit, p.element)
 
 
 def _second(p: Symbol) -> Symbol:

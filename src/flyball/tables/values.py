@@ -30,6 +30,7 @@ from . import constraint_rows
 from .element_numbers import ElementNumbers, element_numbers, number_type
 from .forest import check_centred
 from .mass_properties import mass_table
+from .point_formulas import check_point_formulas
 from .reference_configuration import BodyState, Poses, Refresh, free_velocities, positions, tree_frames
 from .structure_definition import Structure, TermSpec, velocity_names
 from .table_definitions import FLAT, Frames, Scales, SwitchNumbers, System, zero_table
@@ -194,6 +195,8 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
     forces = _force_parameters(
         s, pose, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
     )
+    if refresh.base is None and s.points and s.code_tables and dtype is float:
+        check_point_formulas(s, pose, forces, terms, float(length))
     of_switches = refresh.table("switch_numbers", zero_table(SwitchNumbers, len(s.switches), dtype), dtype)
     constraint_rows.fill_switch_numbers(s, numbers, of_switches, refresh.asks, pose.frame_separation)
     semidefinite = float((table.excess_inertia != 0.0).any() or (table.excess_mass != 0.0).any())

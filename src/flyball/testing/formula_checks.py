@@ -6,6 +6,7 @@ Formulas are evaluated at random states of frames in arbitrary motion, as functi
 from __future__ import annotations
 
 import ctypes
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -13,9 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..compiler.kernels import FormulaCode, Signature
+from ..compiler.kernels import CodeTable, FormulaCode, Signature, short_reason
 from ..constraints.blocks import ConstraintRow
 from ..constraints.registry import SIGNATURES as ROWS
+from ..constraints.switches.guard_kinds import HELD, OFF, STEADY
+from ..constraints.switches.guard_kinds import SIGNATURES as GUARDS
+from ..errors import ModelError
 from ..expression_graph.evaluation import evaluate
 from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision
 from ..forces import SIGNATURES
@@ -23,6 +27,7 @@ from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.joint import Joint
 from ..model.units import powers_in_si
+from ..tables.point_formulas import REMEDIES, force_wrench, law_values, orientation_need, row_wrench
 
 if TYPE_CHECKING:
     from .contract import Subject
@@ -88,7 +93,6 @@ def wrench_power(wrench: Any, F: Frame, M: Frame) -> Any:
     return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])
 
 
-LAWS = (1.0, -2.0, 0.5)
 SEEDS = range(4)
 INPUTS, WRENCH, EFFORT, _ = SIGNATURES
 (ROW,) = ROWS
@@ -132,7 +136,13 @@ class FormulaState:
             np.ascontiguousarray(x, dtype),
             np.zeros(len(list(flat_numbers(nested_zeros(self.signature.result)))), dtype),
         )
-        ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(code.address)(given.ctypes.data, out.ctypes.data)
+        try:
+            address = code.address
+        except (ImportError, MemoryError):
+            raise
+        except Exception as error:  # Numba raises many kinds of exceptions
+            raise ModelError(f"{self.signature} cannot be compiled: {short_reason(error)}") from error
+        ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(address)(given.ctypes.data, out.ctypes.data)
         return out
 
 
@@ -160,7 +170,7 @@ def nested_zeros(lengths: Any) -> Any:
 def force_states(e: Force, par: Sequence[float]) -> list[FormulaState]:
     """States of the formulas of a force with these parameters."""
     par = (*par, *(0.0,) * (16 - len(par)))
-    laws = tuple(x if law is not None else 0.0 for x, law in zip(LAWS, (*e.laws(), None, None, None), strict=False))
+    laws = law_values(e)
     out = []
     for seed in SEEDS:
         if isinstance(e, CoordinateForce):
@@ -237,6 +247,22 @@ def compiled(s: Subject) -> str:
         plain, fast = state.at(x.tolist()), state.compiled(x, False)
         if _differ(plain, fast, ROUNDING):
             return f"{state.signature} is {_array_text(plain)} in Python and {_array_text(fast)} compiled"
+    return ""
+
+
+def guards(s: Subject) -> str:
+    """Compiled guards of a user-defined kind of switch give what Python gives, nan included, in every mode."""
+    for kind in {type(x.kind) for x in s.element.switches() if hasattr(x.kind, "guard")}:
+        (signature,) = CodeTable(kind, GUARDS).signatures
+        for mode, seed in itertools.product((OFF, HELD, STEADY), SEEDS):
+            numbers = np.random.default_rng(seed).normal(size=sum(signature.lengths) + signature.lengths.count(0))
+            given = nest_numbers(signature.lengths, iter([mode, float(np.sign(numbers[1])), *numbers[2:].tolist()]))
+            state = FormulaState(signature, kind.guard, given)
+            plain, fast = state.at(state.numbers.tolist()), state.compiled(state.numbers, False)
+            if _differ(plain, fast, ROUNDING):
+                return (
+                    f"{signature} of {kind.__name__} is {_array_text(plain)} in Python and {_array_text(fast)} compiled"
+                )
     return ""
 
 
@@ -386,6 +412,21 @@ def _rate(row: Any, F: Any, M: Any) -> Any:
 def _size(state: FormulaState) -> float:
     """The largest number in the result of a state."""
     return float(np.abs(state.at(state.numbers.tolist())).max())
+
+
+def points(s: Subject) -> str:
+    """What may act on a point mass exerts no torque there, and does not depend on the orientation of its frame."""
+    for state in s.states:
+        if state.row is not None:
+            roles, formula = state.row.points, row_wrench(state.row, state.arguments[0])
+        elif state.signature == WRENCH and isinstance(s.element, Force) and s.element.on_points():
+            roles, formula = "FM", force_wrench(s.element, state.arguments[0], state.arguments[3])
+        else:
+            continue
+        for role in (x for x in roles if x in s.element.ends()):
+            if why := orientation_need(formula, state.arguments[1], state.arguments[2], role):
+                return f"{state.signature} {why}, which may be on a point mass: {REMEDIES[state.row is not None]}"
+    return ""
 
 
 def axes(s: Subject) -> str:

@@ -63,7 +63,10 @@ def declared_shapes(modules: list[ModuleType]) -> tuple[Shape, ...]:
     for m in modules:
         if hasattr(m, "KIND"):
             if m.KIND in shapes:
-                raise RuntimeError(f"shape KIND {m.KIND} is taken twice, the second time by {m.__name__}")
+                free = 1 + max(x.KIND for x in modules if hasattr(x, "KIND"))
+                raise RuntimeError(
+                    f"shape KIND {m.KIND} is taken twice, the second time by {m.__name__}; the next free is {free}"
+                )
             shapes[m.KIND] = Shape(m.KIND, m.support, getattr(m, "face", None), getattr(m, "radius", no_rounding))
     return tuple(shapes[k] for k in sorted(shapes))
 

@@ -22,10 +22,6 @@ class Stop(SwitchKind):
         """Return its row if it is at rest at a bound."""
         return bound_rows(s, at, AT_REST if n.mode[s] != OFF else NO_IMPULSE) if at and still else []
 
-    def start_violation(self, n: Instant, s: int) -> float:
-        """Return the penetration."""
-        return self.penetration(n, s)
-
     def penetration(self, n: Instant, s: int) -> float:
         """Return by how much its quantity is beyond a bound."""
         return float(max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s]))

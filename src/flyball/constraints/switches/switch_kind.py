@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import NO_IMPULSE, SLIDING
+from .guard_kinds import G_LOWER, G_UPPER
 
 NO_ROW, ANY_FORCE, ONE_SIDED, INTERVAL, DISC = range(5)
 """Forces that a row can carry. NO_ROW: it has no row. ANY_FORCE: any. ONE_SIDED: in its direction only. INTERVAL: up
@@ -152,8 +153,10 @@ class SwitchKind:
         """Update bounds once the modes are decided; ``hit``: switches with an impact."""
 
     def start_violation(self, n: Instant, s: int) -> float:
-        """Return by how much its rule is violated where a motion starts."""
-        return 0.0
+        """Return by how much its rule is violated where a motion starts: its quantity is beyond a monitored bound."""
+        below = n.W.modes.lower[s] - n.x[s] if G_LOWER in self.guards else 0.0
+        above = n.x[s] - n.W.modes.upper[s] if G_UPPER in self.guards else 0.0
+        return float(max(below, above))
 
     def penetration(self, n: Instant, s: int) -> float:
         """Return by how much its quantity is beyond a bound."""

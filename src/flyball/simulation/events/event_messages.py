@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import BY_RATE, FROZEN, G_LAW, G_SHARED, OFF
+from ...constraints.switches.guard_kinds import BY_RATE, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF
 from ...constraints.switches.switch_kind import DISC, ONE_SIDED
 from ...errors import ModelError
 from ...model.contact_point import Touch
@@ -65,7 +65,8 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
             "of them, "
             f"or give method='impulse', which puts them side by side"
         )
-    if n.kinds[s].bounded:
+    remedy = "change the start or the limit"
+    if n.kinds[s].bounded or {G_LOWER, G_UPPER}.intersection(n.kinds[s].guards):
         lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         if not np.isfinite(upper):
             rule = f"at least {value_in_words(lower, unit)}"
@@ -77,7 +78,9 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
     else:
         rule = "not be negative" if n.kinds[s].forces == ONE_SIDED else "be zero"
         said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must {rule}"
-    return ModelError(f"{e.title}: the motion starts beyond it: {said}; change the start or the limit")
+    if not type(n.kinds[s]).__module__.startswith("flyball."):
+        remedy += ", or give its kind a guard of its own, if its quantity may pass the bound"
+    return ModelError(f"{e.title}: the motion starts beyond it: {said}; {remedy}")
 
 
 def passed_bound(n: InstantProblem, s: int, past: float) -> UnresolvedInstant:

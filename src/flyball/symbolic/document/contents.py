@@ -13,6 +13,7 @@ from ...expression_graph.printers.latex import latex
 from ...expression_graph.printers.text import text
 from ...expression_graph.simplification.simplify import simplified
 from ...model.joint import Joint
+from ...model.messages import kind_in_words
 from ..named_equations import generalised_forces
 from .parts import (
     Block,
@@ -164,7 +165,7 @@ def constraints(eq: Equations) -> list[Section]:
     ]
     for owner, rows in owners.items():
         e = s.model[owner]
-        what = joint_blocks(e) if isinstance(e, Joint) else type(e).__name__.lower()
+        what = joint_blocks(e) if isinstance(e, Joint) else kind_in_words(type(e))
         formulas = []
         for k in rows:
             free = k < len(s.rows) and not s.rows[k].holonomic
