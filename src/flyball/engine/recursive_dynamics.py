@@ -7,16 +7,16 @@ All spatial vectors of one tree are taken about one point P, the reference point
 world's axes: a motion is (angular velocity, velocity of the body's point at P), a force (moment about P, force). Sums
 over subtrees then need no transformation. P is regarded as fixed.
 
-Let S_d be the twist of velocity d (per unit), b its body, v and a the velocity and the acceleration of a body (of ground:
-0 and -g), f = I a + v x* I v its force. Columns of a body turn with it, except translations along the world's axes (of
-FREE, PLANAR and POINT): let vbar, abar be the velocity and acceleration of the parent plus those translations. With
+Let S be the twist of one velocity d (per unit), v and a the velocity and the acceleration of a body (of ground: 0 and
+-g), f = I a + v x* I v its force. Columns of a body turn with it, except translations along the world's axes (of FREE,
+PLANAR and POINT): let vbar, abar be the velocity and acceleration of the parent plus those translations. With
 
-    psi = vbar x S,    chi = abar x S + vbar x psi,    phi = psi + v_b x S  (without the last term for translations)
+    psi = vbar x S,    chi = abar x S + vbar x psi,    phi = psi + v x S  (without v x S for those translations)
 
-a displacement along d changes the force of every body in the subtree by S x* f + I chi + B psi, and a change of velocity
-d changes it by I phi + B S, where B psi = I (psi x v) + psi x* I v + v x* I psi depends on the angular part of psi only:
-its moment is N psi, its force -2 l x psi with the linear momentum l. The term S x* f is cancelled by the displacement of
-S in the power of forces at d and beyond.
+a displacement along d changes the force of every body in the subtree by S x* f + I chi + B psi, and a change of the
+velocity d changes it by I phi + B S. Here B psi = I (psi x v) + psi x* I v + v x* I psi depends on the angular part of psi
+only: its moment is N psi, its force -2 l x psi with the linear momentum l. The displacement of S in the power of forces
+at d and beyond cancels the term S x* f.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.formulas import formula
-from ..compiler.struct_layout import Float2, Int1
+from ..compiler.struct_layout import Float1, Float2, Int1
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, scale, store3, store9, sub, symmetric
 from ..tables.table_definitions import FREE, PLANAR, POINT, Tree
 from .articulated_body import (
@@ -37,7 +37,7 @@ from .articulated_body import (
     solve_articulated,
     store_symmetric,
 )
-from .kinematics import body_pose, twist_column
+from .kinematics import body_pose, normalise_quaternions, twist_column
 
 
 class VelocityPaths(NamedTuple):
@@ -63,6 +63,7 @@ class TreeDynamics(NamedTuple):
     phi: Float2  # (nv, 6)
     mass: Float2  # (nv, nv): the mass matrix at and below its diagonal, or its factor
     vector: Float2  # (3, nv): accelerations, forces, efforts of drivers
+    coordinates: Float1  # (nq,): with normalised quaternions
 
 
 def velocity_paths(tree: Tree) -> VelocityPaths:
@@ -80,13 +81,14 @@ def velocity_paths(tree: Tree) -> VelocityPaths:
     return VelocityPaths(body.astype(np.int64), previous.astype(np.int64), along.astype(np.int64))
 
 
-def tree_dynamics(bodies: int, velocities: int, dtype: Any = float) -> TreeDynamics:
-    """Workspace for a number of bodies and of velocities."""
+def tree_dynamics(bodies: int, coordinates: int, velocities: int, dtype: Any = float) -> TreeDynamics:
+    """Workspace for a number of bodies, coordinates and velocities."""
     widths = {"point": 3, "inertia": 10, "coriolis": 12}
     of_bodies = ("point", "velocity", "acceleration", "force", "inertia", "coriolis")
-    tables = [np.zeros((bodies, widths.get(name, 6)), dtype) for name in of_bodies]
+    tables: list[Any] = [np.zeros((bodies, widths.get(name, 6)), dtype) for name in of_bodies]
     tables += [np.zeros((velocities, 6), dtype) for _ in range(4)]
-    return TreeDynamics(*tables, np.zeros((velocities, velocities), dtype), np.zeros((3, velocities), dtype))
+    square, rows = np.zeros((velocities, velocities), dtype), np.zeros((3, velocities), dtype)
+    return TreeDynamics(*tables, square, rows, np.zeros(coordinates, dtype))
 
 
 @formula
@@ -147,9 +149,15 @@ def load_inertia(D, b):
 
 @formula
 def place_bodies(S, W, D, q):
-    """Poses of all bodies, the points that spatial vectors refer to, and the twists of all velocities."""
+    """Poses of all bodies, the points that spatial vectors refer to, and the twists of all velocities.
+
+    ``q`` is not changed; its quaternions may have any length.
+    """
+    for i in range(q.shape[0]):
+        D.coordinates[i] = q[i]
+    normalise_quaternions(S, D.coordinates)
     for b in range(S.tree.parent.shape[0]):
-        body_pose(S, W, b, q)
+        body_pose(S, W, b, D.coordinates)
         a = S.tree.parent[b]
         at = load3(W.O, b, 0)
         P = at if a < 0 else load3(D.point, a, 0)
@@ -179,6 +187,16 @@ def move_body(S, V, D, b, v, vdot):
             acceleration = add6(acceleration, scale6(v[d], cross_motion(velocity, column)))
     store6(D.velocity, b, velocity)
     store6(D.acceleration, b, acceleration)
+
+
+@formula
+def move_bodies(S, V, D, v):
+    """Velocities of all bodies at the poses in W, and accelerations where the generalised ones are zero."""
+    rest = D.vector[0]
+    for d in range(rest.shape[0]):
+        rest[d] = 0.0 * D.column[d, 0]
+    for b in range(S.tree.parent.shape[0]):
+        move_body(S, V, D, b, v, rest)
 
 
 @formula
@@ -247,6 +265,19 @@ def mass_matrix(V, D):
         e = d
         while e >= 0:
             D.mass[d, e] = dot6(load6(D.column, e), momentum)
+            e = V.previous[e]
+
+
+@formula
+def copy_mass_matrix(V, D, out):
+    """Write the whole mass matrix, symmetric."""
+    n = V.body.shape[0]
+    clear(out, n, n)
+    for d in range(n):
+        e = d
+        while e >= 0:
+            out[d, e] = D.mass[d, e]
+            out[e, d] = D.mass[d, e]
             e = V.previous[e]
 
 
@@ -446,7 +477,7 @@ def total_momentum(S, W, D, out):
 def centroidal_momentum_matrix(S, V, D, out):
     """Momentum (rows 0 to 2) and angular momentum about the centre of mass (3 to 5) per unit of each velocity.
 
-    Of the composite inertias in D.
+    The composite inertias in D are those of its poses.
     """
     o = 0.0 * D.point[0, 0]
     mass, moment = o, (o, o, o)
