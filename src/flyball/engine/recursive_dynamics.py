@@ -13,8 +13,8 @@ PLANAR and POINT): let vbar, abar be the velocity and acceleration of the parent
 
     psi = vbar x S,    chi = abar x S + vbar x psi,    phi = psi + v x S  (without v x S for those translations)
 
-a displacement along d changes the force of every body in the subtree by S x* f + I chi + B psi, and a change of the
-velocity d changes it by I phi + B S. Here B psi = I (psi x v) + psi x* I v + v x* I psi depends on the angular part of psi
+a displacement along d changes the force of every body in the subtree by S x* f + I chi + B psi; a change of velocity
+d changes it by I phi + B S. Here B psi = I (psi x v) + psi x* I v + v x* I psi depends on the angular part of psi
 only: its moment is N psi, its force -2 l x psi with the linear momentum l. The displacement of S in the power of forces
 at d and beyond cancels the term S x* f.
 """
@@ -83,12 +83,15 @@ def velocity_paths(tree: Tree) -> VelocityPaths:
 
 def tree_dynamics(bodies: int, coordinates: int, velocities: int, dtype: Any = float) -> TreeDynamics:
     """Workspace for a number of bodies, coordinates and velocities."""
-    widths = {"point": 3, "inertia": 10, "coriolis": 12}
-    of_bodies = ("point", "velocity", "acceleration", "force", "inertia", "coriolis")
-    tables: list[Any] = [np.zeros((bodies, widths.get(name, 6)), dtype) for name in of_bodies]
-    tables += [np.zeros((velocities, 6), dtype) for _ in range(4)]
-    square, rows = np.zeros((velocities, velocities), dtype), np.zeros((3, velocities), dtype)
-    return TreeDynamics(*tables, square, rows, np.zeros(coordinates, dtype))
+    nb, nv = bodies, velocities
+
+    def z(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype)
+
+    return TreeDynamics(
+        z(nb, 3), z(nb, 6), z(nb, 6), z(nb, 6), z(nb, 10), z(nb, 12), z(nv, 6), z(nv, 6), z(nv, 6), z(nv, 6),
+        z(nv, nv), z(3, nv), z(coordinates),
+    )  # fmt: skip
 
 
 @formula

@@ -55,6 +55,8 @@ class Prepared(RecursiveMethods):
         The coordinate whose rate each velocity is, (nv,).
     rows : tuple of str
         Element and restrained quantity of each constraint row, (nr,).
+    specialized : bool
+        Whether `rnea`, `aba`, `mass_matrix` and the derivatives use machine code generated for this mechanism.
     stops : tuple of str
         Rigid stops (`Limit`), which count as open at every state; `simulate` sees them.
     """
@@ -66,17 +68,19 @@ class Prepared(RecursiveMethods):
     names: tuple[str, ...]
     rows: tuple[str, ...]
     stops: tuple[str, ...]
+    specialized: bool
     _start: Assembly
     _here: threading.local
 
-    def __init__(self, start: InitialState, model: Model, stops: tuple[str, ...]) -> None:
+    def __init__(self, start: InitialState, model: Model, stops: tuple[str, ...], specialize: bool) -> None:
         c = start.assembly.compiled
         q, v = start.assembly.q.copy(), start.assembly.v.copy()
         for a in (q, v):
             a.setflags(write=False)
         names = tuple(n.name for n in velocity_names(c.structure))
         rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
-        vars(self).update(model=model, stops=stops, coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
+        vars(self).update(model=model, stops=stops, specialized=specialize)
+        vars(self).update(coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
         vars(self).update(_start=start.assembly.again(), _here=threading.local())
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -281,6 +285,7 @@ class PrepareOptions(Options):
 
     coordinates: str
     parameters: Mapping[str, float] | None
+    specialize: bool
 
 
 def prepare(model: Model, o: PrepareOptions) -> Prepared:
@@ -289,4 +294,4 @@ def prepare(model: Model, o: PrepareOptions) -> Prepared:
     free = model.changed(stops) if stops else model
     refuse_unsupported(free, "prepare", acts_while_sliding)
     start = find_initial_state(free.snapshot(), 0.0, o.parameters, None, o.coordinates)
-    return Prepared(start, model.snapshot(), tuple(stops))
+    return Prepared(start, model.snapshot(), tuple(stops), o.specialize)

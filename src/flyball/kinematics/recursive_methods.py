@@ -6,10 +6,12 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..codegen.batch_code import LARGEST_ANGLE, TASKS, BatchCode, batch_code
 from ..compiler.kernels import BoundKernel, StructBuffer
 from ..engine.batch_dynamics import (
     CENTROIDAL_MATRIX,
@@ -90,24 +92,38 @@ class OneState:
     results : list of ndarray
     """
 
-    def __init__(self, x: BatchDynamics, lengths: Sequence[int], shapes: Sequence[tuple[int, ...]], frame: FrameOnBody):
-        self.numbers = np.zeros(sum(lengths))
-        self.states = np.split(self.numbers, np.cumsum(lengths)[:-1])
+    def __init__(
+        self,
+        x: BatchDynamics,
+        task: int,
+        lengths: Sequence[int],
+        shapes: Sequence[tuple[int, ...]],
+        frame: FrameOnBody,
+    ) -> None:
+        code = x.code(task)
+        self.states = [np.zeros((1, n)) for n in lengths]
         self.results = [np.zeros(shape) for shape in shapes]
-        rows = [r.reshape(1, -1, r.shape[-1]) for r in self.results]
-        self.call = x.workspace.bound(_batch_arrays([s.reshape(1, -1) for s in self.states], rows, frame))
-        self.quaternions = x.quaternions
+        if code is None:
+            flat = [r.reshape(1, -1, r.shape[-1]) for r in self.results]
+            self.call: Callable[[], int] = partial(x.workspace.bound(_batch_arrays(self.states, flat, frame)), task)
+        else:
+            self.call = code.bound(self.states, self.results)
+        self.quaternions, self.largest = x.quaternions, LARGEST_ANGLE if code is not None else math.inf
 
-    def evaluate(self, task: int, given: Sequence[Array]) -> bool:
+    def evaluate(self, given: Sequence[Array]) -> bool:
         """Evaluate; False if the arguments or the result are not ordinary, and `RecursiveMethods` must look closer."""
+        total = 0.0
         for mine, x in zip(self.states, given, strict=True):
-            mine[:] = x
-        if not math.isfinite(self.numbers.sum()):
+            mine[0] = x
+            total += np.add.reduce(x)
+        if not math.isfinite(total):
             return False
         q = given[0]
+        if self.largest < math.inf and np.abs(q).max(initial=0.0) > self.largest:
+            return False
         if any(not (q[k] or q[k + 1] or q[k + 2] or q[k + 3]) for k, _ in self.quaternions):
             return False
-        return self.call(task) == 1
+        return self.call() == 1
 
 
 class BatchDynamics:
@@ -118,10 +134,13 @@ class BatchDynamics:
     start : Assembly
     names : sequence of str
         Of the velocities, for messages.
+    specialize : bool
+        Whether machine code is generated for the mechanism.
     """
 
-    def __init__(self, start: Assembly, names: Sequence[str]) -> None:
+    def __init__(self, start: Assembly, names: Sequence[str], specialize: bool) -> None:
         c = start.compiled
+        self.q, self._specialize, self._code = start.q, specialize, dict[int, BatchCode | None]()
         S: System = c.values.system
         self.compiled, self.structure, self.names = c, c.structure, names
         self.system = S._replace(tree=S.tree._replace(law=np.full_like(S.tree.law, -1)))
@@ -156,29 +175,42 @@ class BatchDynamics:
         body = values.bodies[carrier]
         return _frame_on_body(self.structure.place[carrier], body.R.T @ (p - body.c), body.R.T @ R)
 
+    def code(self, task: int) -> BatchCode | None:
+        """Machine code generated for this mechanism; None if none is wanted, or possible."""
+        if not self._specialize or task not in TASKS:
+            return None
+        if task not in self._code:
+            self._code[task] = batch_code(self.structure, self.system, self.paths, task)
+        return self._code[task]
+
     def evaluate(
         self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody, threads: int
     ) -> None:
         """Evaluate at all states (k, n), into results (k, rows, columns)."""
-        k = len(states[0])
-        if threads == 1 or k < 2 * threads:
-            done = self.workspace.bound(_batch_arrays(states, results, frame))(task)
-            if done < k:
-                self.refuse(task, done, states)
-            return
-        ends = np.linspace(0, k, threads + 1).astype(int)
+        code = self.code(task)
+        if code is not None and np.abs(states[0]).max(initial=0.0) > LARGEST_ANGLE:
+            code = None
 
-        def part(i: int) -> tuple[int, int]:
-            rows = slice(ends[i], ends[i + 1])
-            arrays = _batch_arrays([x[rows] for x in states], [x[rows] for x in results], frame)
-            return int(ends[i]) + _Workspace(self).bound(arrays)(task), int(ends[i + 1])
+        def part(begin: int, end: int) -> int:
+            """Evaluate some states; returns the first at which that failed, or ``end``."""
+            mine, out = [x[begin:end] for x in states], [x[begin:end] for x in results]
+            done = code.bound(mine, out)() if code is not None else 0
+            if done < len(mine[0]):  # also to find the state that fails among those of a block
+                rest = _batch_arrays([x[done:] for x in mine], [x[done:] for x in out], frame)
+                done += self.workspace.bound(rest)(task)
+            return begin + done
 
-        with ThreadPoolExecutor(threads) as pool:
-            for done, end in pool.map(part, range(threads)):
-                if done < end:
-                    self.refuse(task, done, states)
+        ends = np.linspace(0, len(states[0]), threads + 1).astype(int).tolist()
+        if threads == 1:
+            failed = [part(*ends)]
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                failed = list(pool.map(part, ends[:-1], ends[1:]))
+        for i, end in zip(failed, ends[1:], strict=True):
+            if i < end:
+                self.refuse(i, states)
 
-    def refuse(self, task: int, i: int, states: Sequence[Array]) -> None:
+    def refuse(self, i: int, states: Sequence[Array]) -> None:
         """Raise the error of a state at which the accelerations are not determined."""
         inertia = np.zeros((1, len(self.names), len(self.names)))
         self.workspace.bound(_batch_arrays([x[i : i + 1] for x in states], [inertia], _NO_FRAME))(MASS_MATRIX)
@@ -198,9 +230,9 @@ _NO_FRAME = _frame_on_body(-1, np.zeros(3), np.eye(3))
 
 
 def _batch_arrays(states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody) -> BatchArrays:
-    q, v, given = (*states, *[states[0][:, :0]] * (3 - len(states)))
-    first, second, third = (*results, *[_NO_COLUMNS] * (3 - len(results)))
-    return BatchArrays(q, v, given, frame, first, second, third)
+    padded: list[Array] = [*states, *[states[0][:, :0]] * (3 - len(states))]
+    outputs: list[Array] = [*results, *[_NO_COLUMNS] * (3 - len(results))]
+    return BatchArrays(padded[0], padded[1], padded[2], frame, outputs[0], outputs[1], outputs[2])
 
 
 BOUND_METHODS = {
@@ -232,6 +264,7 @@ class RecursiveMethods:
     names: tuple[str, ...]
     rows: tuple[str, ...]
     model: Any
+    specialized: bool
 
     def rnea(self, q: Array, v: Array, a: Array, *, out: Array | None = None, threads: int = 1) -> Array:
         """Inverse dynamics: the generalised forces that give accelerations (recursive Newton-Euler algorithm).
@@ -446,12 +479,17 @@ class RecursiveMethods:
             raise ModelError("q, v and a must be arrays of float64 without gaps, each with as many states")
         shape = (n,) if results == 1 else (n, n)
         arrays = _result_arrays([(*(() if k is None else (k,)), *shape)] * results, out)
-        bound = x.workspace.bound(_batch_arrays(given, [r.reshape(len(given[0]), -1, n) for r in arrays], _NO_FRAME))
+        flat = [r.reshape(len(given[0]), -1, n) for r in arrays]
+        code = x.code(task)
+        evaluate: Callable[[], int]
+        if code is None:
+            evaluate = partial(x.workspace.bound(_batch_arrays(given, flat, _NO_FRAME)), task)
+        else:
+            evaluate = code.bound(given, flat)
 
         def call() -> None:
-            done = bound(task)
-            if done < len(given[0]):
-                x.refuse(task, done, given)
+            if evaluate() < len(given[0]):
+                x.evaluate(task, given, flat, _NO_FRAME, 1)
 
         return call
 
@@ -462,7 +500,7 @@ class RecursiveMethods:
     def _recursive(self) -> BatchDynamics:
         found: BatchDynamics | None = vars(self).get("_batch_dynamics")
         if found is None:
-            found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names)
+            found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names, self.specialized)
         return found
 
     def _require_tree(self, method: str) -> None:
@@ -507,9 +545,9 @@ class RecursiveMethods:
         known = x.workspace.single
         if (task, frame) not in known:
             at = x.frame(frame) if frame is not None else _NO_FRAME
-            known[task, frame] = OneState(x, lengths, shapes, at)
+            known[task, frame] = OneState(x, task, lengths, shapes, at)
         one = known[task, frame]
-        return [r.copy() for r in one.results] if one.evaluate(task, given) else None
+        return [r.copy() for r in one.results] if one.evaluate(given) else None
 
     def _states(self, given: Sequence[Any]) -> tuple[list[Array], int | None]:
         """Arguments as arrays of rows, and their number: None for one state."""

@@ -217,7 +217,7 @@ class _Reader:
         axis = self.numbers(tag.find("axis"), "xyz", "1 0 0")
         if kind not in ("fixed", "floating") and not axis.any():
             self.fail(tag, f"the axis of joint {name!r} is zero")
-        return _Joint(name, kind, *ends, self.origin(tag), axis, tag)
+        return _Joint(name, kind, ends[0], ends[1], self.origin(tag), axis, tag)
 
     def root(self) -> str:
         """The link that is no child; refuse joints that form no tree."""
@@ -295,7 +295,8 @@ class _Reader:
         if mass == 0.0 and rigid is not None and not shapes:
             carrier = next(x for x in self.place if self.carrier.get(x) == rigid)  # the first link of that body
             back = np.linalg.inv(self.place[carrier]) @ T
-            m.add(Frame(name, rigid, position=tuple(back[:3, 3]), orientation=rows(back[:3, :3])))
+            place: dict[str, Any] = {"position": tuple(back[:3, 3]), "orientation": rows(back[:3, :3])}
+            m.add(Frame(name, rigid, **place))
             self.carrier[link] = rigid
             return
         if mass == 0.0 and rigid is None and not self._carries_mass(link, below):
