@@ -270,3 +270,13 @@ def test_a_velocity_that_moves_no_inertia_is_named(specialize):
         p.aba(q, q, q)
     with pytest.raises(fb.AnalysisError, match="mass matrix is singular"):
         p.aba_derivatives(q[4], q[0], q[0])
+
+
+def test_an_axis_near_the_vertical():
+    """It is not taken for the vertical: half a turn about an axis tilted by e moves a point above by 2 e."""
+    e = 1e-6
+    m = fb.Mechanism("tilted", gravity=(0, 0, -G))
+    m.add(fb.Body("A", mass=1, inertia=(1, 1, 1), position=(0, 0, 1)))
+    m.add(fb.Revolute("J", "ground", "A", at=(0, 0, 0), axis=(e, 0, 1)))
+    x, _ = m.prepare(coordinates="joint").pose("A", np.array([np.pi]))
+    np.testing.assert_allclose(x, (2 * e, 0, 1), rtol=1e-9, atol=1e-15)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -27,7 +27,7 @@ from ..engine.batch_dynamics import (
     perform_at_state,
 )
 from ..engine.entry_point import zero_work
-from ..engine.recursive_dynamics import VelocityPaths, tree_dynamics
+from ..engine.recursive_dynamics import VelocityPaths, factor_mass_matrix, solve_mass_matrix, tree_dynamics
 from ..expression_graph.graph import Graph, Node
 from ..expression_graph.printers.llvm import Lines, Module, Place, Procedure, constant, ordered_operations
 from ..tables.structure_definition import Structure
@@ -43,6 +43,8 @@ MAX_OPERATIONS = 120_000
 LARGEST_ANGLE = 1e5
 """Angles [rad] up to which the reduction of arguments is exact enough; larger ones are left to the general kernel."""
 VECTOR = f"<{LANES} x double>"
+FACTOR = "factor"
+"""Base whose entries are vectors: the factor of the mass matrix."""
 BASES = ("q", "v", "given", "first", "second", "third")
 ARGUMENTS = ", ".join(f"ptr %{base}" for base in BASES)
 
@@ -58,18 +60,53 @@ class BatchCode:
     def bound(self, states: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> Callable[[], int]:
         """A call with these arrays: it returns the number of states before the first that fails, or its block."""
         padded = (*states, *[states[0]] * (3 - len(states)), *results, *[results[0]] * (3 - len(results)))
-        return partial(self._call, *[x.ctypes.data for x in padded], len(states[0]))
+        call = partial(self._call, *[x.ctypes.data for x in padded], len(states[0]))
+        call.arrays = padded  # type: ignore[attr-defined]  # kept in memory as long as the call is
+        return call
 
 
-def batch_code(s: Structure, S: System, V: VelocityPaths, task: int) -> BatchCode | None:
+class ForwardDerivativesCode:
+    """Derivatives of forward dynamics: accelerations, derivatives of inverse dynamics, solves with the mass matrix.
+
+    These are three codes, since one for all would take LLVM too long.
+    """
+
+    def __init__(self, forward: BatchCode, inverse: BatchCode, solver: BatchCode) -> None:
+        self._forward, self._inverse, self._solver = forward, inverse, solver
+
+    def bound(self, states: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> Callable[[], int]:
+        """As `BatchCode.bound`."""
+        q, v, _ = states
+        a = np.empty_like(v)
+        forward, inverse = self._forward.bound(states, [a]), self._inverse.bound([q, v, a], results)
+        solve = self._solver.bound(states, results)
+
+        def call() -> int:
+            done = forward()
+            if done == len(q):
+                inverse()
+                solve()
+            return done
+
+        return call
+
+
+def batch_code(s: Structure, S: System, V: VelocityPaths, task: int) -> BatchCode | ForwardDerivativesCode | None:
     """Code of a task, from disk or generated now; None if the mechanism is too large."""
+    if task == FORWARD_DERIVATIVES:
+        parts = [_single_code(s, S, V, part) for part in (FORWARD_DYNAMICS, INVERSE_DERIVATIVES, task)]
+        return None if None in parts else ForwardDerivativesCode(*parts)  # type: ignore[arg-type]
+    return _single_code(s, S, V, task)
+
+
+def _single_code(s: Structure, S: System, V: VelocityPaths, task: int) -> BatchCode | None:
     path = None
     if (folder := cache_folder()) is not None:
         path = folder / f"batch-{_key(S, task)}.o"
         if (code := read_object(path)) is not None:
             mark_used(path)
             return BatchCode(code)
-    text = batch_text(s, S, V, task)
+    text = solver_text(V) if task == FORWARD_DERIVATIVES else batch_text(s, S, V, task)
     if text is None:
         return None
     code = object_code_of_text(text)
@@ -118,7 +155,7 @@ def batch_text(s: Structure, S: System, V: VelocityPaths, task: int) -> str | No
     D = tree_dynamics(len(S.tree.parent), s.nq, s.nv, object)
     states = _States(symbols("q"), symbols("v"), symbols("given"), None, *results)
     perform_at_state(numbers, zero_work(s, S, np.dtype(object)), V, D, states, 0, task)
-    count = 1 if not square else 1 if task == MASS_MATRIX else 3
+    count = 3 if task == INVERSE_DERIVATIVES else 1
     stores = [((base, k), x) for base, out in zip(BASES[3:], results[:count], strict=False)
               for k, x in enumerate(out.ravel())]  # fmt: skip
     granted, graph.granted = graph.granted, []
@@ -131,8 +168,58 @@ def batch_text(s: Structure, S: System, V: VelocityPaths, task: int) -> str | No
     return "\n\n".join([str(module), sine_and_cosine(), _loop(widths)]) + "\n"
 
 
+def solver_text(V: VelocityPaths) -> str:
+    """Code that turns derivatives of forces and a mass matrix M into those of accelerations, -M^-1 times, and M^-1."""
+    n = len(V.body)
+    graph = Graph(rounded=True)
+    D = tree_dynamics(0, 0, n, object)
+    reads: dict[int, Place] = {}
+    entries = [(d, e) for d in range(n) for e in _path(V, d)]
+    for d, e in entries:
+        D.mass[d, e] = graph.symbol(f"M[{d}, {e}]")
+        reads[D.mass[d, e].index] = "x", d * n + e
+    factor_mass_matrix(V, D)
+    stores: list[tuple[Place, Any]] = [((FACTOR, k), D.mass[at]) for k, at in enumerate(entries)]
+    stores += [(("x", k), x) for k, x in enumerate(-np.eye(n).ravel())]  # the solution of this is M^-1
+    widths = {"x": n * n}
+    module = Module("ptr %x, ptr %factor, i64 %stride", partial(_lane_base, widths), _VectorLines)
+    module.add(Procedure("factor", reads, stores))
+    X, reads = np.zeros((n, 1), object), {}
+    for k, at in enumerate(entries):
+        D.mass[at] = graph.symbol(f"L[{k}]")
+        reads[D.mass[at].index] = FACTOR, k
+    for d in range(n):
+        X[d, 0] = graph.symbol(f"x[{d}]")
+        reads[X[d, 0].index] = "x", d * n
+    solve_mass_matrix(V, D, X, 0)
+    module.add(Procedure("column", reads, [(("x", d * n), -x) for d, x in enumerate(X[:, 0])]))
+    columns = [line for base in BASES[3:] for line in (
+        f"  %{base}.c = getelementptr double, ptr %{base}, i64 %c",
+        f"  call {VECTOR} @column(ptr %{base}.c, ptr %factor, i64 %stride)",
+    )]  # fmt: skip
+    block = "\n".join([
+        f"define {VECTOR} @block({ARGUMENTS}, i64 %stride) nounwind {{",
+        "entry:", f"  %factor = alloca {VECTOR}, i64 {len(entries)}",
+        f"  call {VECTOR} @factor(ptr %third, ptr %factor, i64 %stride)", "  br label %head",
+        "head:", "  %c = phi i64 [ 0, %entry ], [ %next, %body ]",
+        f"  %more = icmp slt i64 %c, {n}", "  br i1 %more, label %body, label %done",
+        "body:", *columns, "  %next = add i64 %c, 1", "  br label %head",
+        "done:", f"  ret {VECTOR} zeroinitializer", "}",
+    ])  # fmt: skip
+    return "\n\n".join([str(module), block, _loop(dict.fromkeys(BASES, 0) | dict.fromkeys(BASES[3:], n * n))]) + "\n"
+
+
+def _path(V: VelocityPaths, d: int) -> Iterator[int]:
+    """A velocity and those on its path to ground."""
+    while d >= 0:
+        yield d
+        d = int(V.previous[d])
+
+
 def _lane_base(widths: dict[str, int], lane_of: str) -> list[str]:
-    """Lines that compute the address of a lane's row."""
+    """Lines that compute the address of a lane's row; the factor has vectors, and no rows."""
+    if lane_of == FACTOR:
+        return []
     base, lane = lane_of.split(".")
     return [
         f"%{lane_of}.rows = mul i64 %stride, {int(lane) * widths[base]}",
@@ -178,10 +265,16 @@ class _VectorLines(Lines):
         """A number in all lanes."""
         return f"<{', '.join([f'double {constant(x)}'] * LANES)}>"
 
+    def _vector_address(self, place: Place) -> str:
+        self.used.add(FACTOR)
+        return self.new(f"getelementptr inbounds {VECTOR}, ptr %{FACTOR}, i64 {place[1]}")
+
     def _lane_address(self, place: Place, lane: int) -> str:
         return self.address((f"{place[0]}.{lane}", place[1]))
 
     def read(self, place: Place) -> str:
+        if place[0] == FACTOR:
+            return self.new(f"load {VECTOR}, ptr {self._vector_address(place)}, {self.module.scope(FACTOR)}")
         out = "poison"
         for lane in range(LANES):
             x = self.new(f"load double, ptr {self._lane_address(place, lane)}, {self.module.scope(place[0])}")
@@ -189,6 +282,11 @@ class _VectorLines(Lines):
         return out
 
     def put(self, place: Place, name: str) -> None:
+        """Code that stores the lanes."""
+        if place[0] == FACTOR:
+            at = self._vector_address(place)
+            self.lines.append(f"store {VECTOR} {name}, ptr {at}, {self.module.scope(FACTOR)}")
+            return
         for lane in range(LANES):
             x = self.new(f"extractelement {VECTOR} {name}, i64 {lane}")
             at = self._lane_address(place, lane)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..codegen.batch_code import LARGEST_ANGLE, TASKS, BatchCode, batch_code
+from ..codegen.batch_code import LARGEST_ANGLE, TASKS, BatchCode, ForwardDerivativesCode, batch_code
 from ..compiler.kernels import BoundKernel, StructBuffer
 from ..engine.batch_dynamics import (
     CENTROIDAL_MATRIX,
@@ -140,7 +140,8 @@ class BatchDynamics:
 
     def __init__(self, start: Assembly, names: Sequence[str], specialize: bool) -> None:
         c = start.compiled
-        self.q, self._specialize, self._code = start.q, specialize, dict[int, BatchCode | None]()
+        self._specialize = specialize
+        self._code: dict[int, BatchCode | ForwardDerivativesCode | None] = {}
         S: System = c.values.system
         self.compiled, self.structure, self.names = c, c.structure, names
         self.system = S._replace(tree=S.tree._replace(law=np.full_like(S.tree.law, -1)))
@@ -175,7 +176,7 @@ class BatchDynamics:
         body = values.bodies[carrier]
         return _frame_on_body(self.structure.place[carrier], body.R.T @ (p - body.c), body.R.T @ R)
 
-    def code(self, task: int) -> BatchCode | None:
+    def code(self, task: int) -> BatchCode | ForwardDerivativesCode | None:
         """Machine code generated for this mechanism; None if none is wanted, or possible."""
         if not self._specialize or task not in TASKS:
             return None
