@@ -103,6 +103,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import Interrupted as Interrupted
     from .errors import MobilityError as MobilityError
     from .errors import ModelError as ModelError
+    from .errors import ModelWarning as ModelWarning
     from .errors import NotConverged as NotConverged
     from .errors import PerformanceNotice as PerformanceNotice
     from .errors import SimulationError as SimulationError
@@ -190,6 +191,7 @@ _HOME = {
     "IMU": "model.controller",
     "Table": "model.table",
     "load": "mechanism",
+    "ModelWarning": "errors",
     "PerformanceNotice": "errors",
     "Interrupted": "errors",
     "StartWarning": "errors",

@@ -80,6 +80,10 @@ def import_optional(package: str, extra: str) -> Any:
         raise ImportError(f"this needs the package {package}: pip install 'flyball[{extra}]'") from error
 
 
+class ModelWarning(UserWarning):
+    """Something in a model file of another program has no meaning here, and is not used."""
+
+
 class PerformanceNotice(UserWarning):
     """A calculation works, but far more slowly than possible."""
 

@@ -55,10 +55,18 @@ for _family in (
             setattr(_family, _name, on_one_thread(_method, by_scipy=_family is StaticsMethods))
 
 
-def load(path: str | os.PathLike) -> Mechanism:
-    """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, or Python.
+def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
+    """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, Python, or a robot in URDF.
 
-    A file ``*.py`` is executed, as on the command line; it defines ``m``, ``mechanism`` or ``mechanism()``.
+    A file ``*.py`` is executed, as on the command line; it defines ``m``, ``mechanism`` or ``mechanism()``. A file
+    ``*.urdf`` is a robot: its links are bodies, a link without mass that is fixed to another is a frame. What of it has
+    no meaning here is listed in a `ModelWarning`.
+
+    Parameters
+    ----------
+    path : str or path
+    floating : bool
+        Of a robot: whether its root link moves freely; by default it is fixed to ground.
 
     Raises
     ------
@@ -74,8 +82,14 @@ def load(path: str | os.PathLike) -> Mechanism:
         from .model.python_file import load_python
 
         return load_python(given, Mechanism)
+    if given.suffix.lower() == ".urdf":
+        from .model.urdf import load_urdf
+
+        return load_urdf(given, Mechanism, floating)
     from .model.toml_file import load
 
+    if floating:
+        raise ModelError(f"{given}: floating=True is for robots in URDF; add or leave out the joints to ground here")
     return load(given, Mechanism)
 
 

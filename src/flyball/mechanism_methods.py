@@ -352,7 +352,13 @@ class MotionMethods(Model):
 
         return simulate_with_checkpoints(self, CheckpointOptions.from_arguments(locals()))
 
-    def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
+    def prepare(
+        self,
+        *,
+        coordinates: str = "auto",
+        parameters: Mapping[str, float | str] | None = None,
+        specialize: bool = False,
+    ) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.
 
         For loops of your own: controllers, estimators, planners. Analyses do not need it: what one call prepares is
@@ -364,6 +370,10 @@ class MotionMethods(Model):
             Coordinates of the arrays; auto: those with the cheaper right-hand side.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
+        specialize : bool
+            Generate machine code of the recursive dynamics (`rnea`, `aba`, `mass_matrix` and the derivatives) for this
+            mechanism when each is first used, and keep it on disk: 2 to 5 times faster at many states, after a second
+            of compiling for an arm, half a minute for the derivatives of a humanoid.
 
         Returns
         -------

@@ -29,7 +29,7 @@ app = typer.Typer(
 )
 
 ModelFile = Annotated[
-    Path, typer.Argument(help="A model file: .toml, or .py that defines m, mechanism or mechanism().")
+    Path, typer.Argument(help="A model file: .toml, .urdf, or .py that defines m, mechanism or mechanism().")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 AboutEquilibrium = Annotated[

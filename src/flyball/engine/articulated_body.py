@@ -81,13 +81,13 @@ def rotated_inertia(R, I):
 
 
 @formula
-def body_inertia(S, W, b):
-    """Mass, first moment and inertia of body b about W.O[b]."""
+def body_inertia(S, W, b, point):
+    """Mass, first moment and inertia of body b about a point."""
     m = S.bodies.mass[b]
     if m == 0.0:
         return m, (m, m, m), (m, m, m, m, m, m)
     J = rotated_inertia(load9(W.BK, b, 3), load9(S.bodies.inertia, b, 0))
-    r = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
+    r = sub(load3(W.BK, b, 0), point)
     return m, scale(m, r), shifted_inertia(J, scale(0.5 * m, r), r)
 
 
@@ -131,7 +131,7 @@ def update_composite_bodies(S, W):
     n = S.tree.parent.shape[0]
     for b in range(n):
         store_root_twists(S, W, b)
-        m, h, J = body_inertia(S, W, b)
+        m, h, J = body_inertia(S, W, b, load3(W.O, b, 0))
         C[b, 0] = m
         store3(C, b, 1, h)
         store_symmetric(C, b, 4, J)
@@ -262,7 +262,7 @@ def add_pending_inertia(A, b, I):
 def add_body_inertia(S, W, b, I):
     """Articulated inertia of body b: ``I``, its own inertia and the inertia stored by other children."""
     J, H, K, lost, mass = I
-    m, h, own = body_inertia(S, W, b)
+    m, h, own = body_inertia(S, W, b, load3(W.O, b, 0))
     H = (H[0], H[1] - h[2], H[2] + h[1], H[3] + h[2], H[4], H[5] - h[0], H[6] - h[1], H[7] + h[0], H[8])
     I = add_symmetric(J, own), H, (K[0] + m, K[1], K[2], K[3] + m, K[4], K[5] + m), lost, mass + m
     if W.IC[b, HAS_PENDING].real > 0.0:

@@ -8,31 +8,31 @@ from __future__ import annotations
 import numbers
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..analysis_options import Options
 from ..assembly.assembled_state import Assembly
-from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.entry_point import MOTION
-from ..engine.kinematics import coordinate_rates, retract, turned_angles, twist_column
+from ..engine.kinematics import coordinate_rates, retract, turned_angles
 from ..engine.rows import BY_TIME
 from ..errors import AnalysisError, ModelError
+from ..forces.limit import Limit
 from ..laws.bytecode import evaluate_jet
 from ..laws.python_functions import function_fault
-from ..model.body import GROUND, Frame
 from ..model.model import Model
 from ..model.unsupported_elements import acts_while_sliding, refuse_unsupported
 from ..results.recorded_kinematics import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
-from ..tables.forest import point_mass_obstacles
 from ..tables.structure_definition import velocity_names
+from .recursive_methods import RecursiveMethods
 
 
-class Prepared:
+class Prepared(RecursiveMethods):
     """A mechanism in one kind of coordinates, at one set of parameter values. It is immutable.
 
     Threads may share it. Results depend on the arguments only. Whole turns of angles count as far as q contains them:
@@ -55,6 +55,10 @@ class Prepared:
         The coordinate whose rate each velocity is, (nv,).
     rows : tuple of str
         Element and restrained quantity of each constraint row, (nr,).
+    specialized : bool
+        Whether `rnea`, `aba`, `mass_matrix` and the derivatives use machine code generated for this mechanism.
+    stops : tuple of str
+        Rigid stops (`Limit`), which count as open at every state; `simulate` sees them.
     """
 
     model: Any
@@ -63,17 +67,20 @@ class Prepared:
     v: np.ndarray
     names: tuple[str, ...]
     rows: tuple[str, ...]
+    stops: tuple[str, ...]
+    specialized: bool
     _start: Assembly
     _here: threading.local
 
-    def __init__(self, start: InitialState) -> None:
+    def __init__(self, start: InitialState, model: Model, stops: tuple[str, ...], specialize: bool) -> None:
         c = start.assembly.compiled
         q, v = start.assembly.q.copy(), start.assembly.v.copy()
         for a in (q, v):
             a.setflags(write=False)
         names = tuple(n.name for n in velocity_names(c.structure))
         rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
-        vars(self).update(model=c.structure.model, coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
+        vars(self).update(model=model, stops=stops, specialized=specialize)
+        vars(self).update(coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
         vars(self).update(_start=start.assembly.again(), _here=threading.local())
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -105,16 +112,6 @@ class Prepared:
     def parameters_given(self) -> dict[str, Any]:
         """Parameter values with which it was prepared, in place of the model's."""
         return dict(self._start.compiled.parameters)
-
-    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
-        """Return M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
-        c = self._workspace("bare")
-        self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
-        M = np.zeros((len(self.v), len(self.v)))
-        row, at, _ = c.values.system.mass_entries
-        M[row, at] = c.work.M
-        M[at, row] = c.work.M
-        return M
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return vdot, (nv,) [m/s^2, rad/s^2], including constraint reactions.
@@ -167,36 +164,8 @@ class Prepared:
         retract(self._start.compiled.values.system, q, d)
         return q
 
-    def pose(self, name: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3);
-        world axes.
-        """
-        c = self._at(self._workspace(), 0.0, q, np.zeros(len(self.v)))
-        b, offset, turn = self._body_of_frame(c, name)
-        if b < 0:
-            return offset, turn
-        p, R = c.work.BK[b, :3].copy(), c.work.BK[b, 3:12].reshape(3, 3).copy()
-        return p + R @ offset, R @ turn
-
-    def frame_jacobian(self, name: str, q: np.ndarray) -> np.ndarray:
-        """Return the derivatives of a frame's velocity (rows 0 to 2) and angular velocity (3 to 5), world axes, (6,
-        nv).
-        """
-        c = self._at(self._workspace(), 0.0, q, np.zeros(len(self.v)))
-        S, W = c.values.system, c.work
-        b, offset, _ = self._body_of_frame(c, name)
-        J = np.zeros((6, len(self.v)))
-        point = W.BK[b, :3] + W.BK[b, 3:12].reshape(3, 3) @ offset
-        while b >= 0:
-            for k in range(int(S.tree.nv[b])):
-                turn, shift = (np.array(x) for x in twist_column(S, W, b, k))
-                at = int(S.tree.v[b]) + k
-                J[:3, at], J[3:, at] = shift + np.cross(turn, point - W.O[b]), turn
-            b = int(S.tree.parent[b])
-        return J
-
     def __getstate__(self) -> dict[str, Any]:
-        return {k: x for k, x in vars(self).items() if k != "_here"}
+        return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _here=threading.local())
@@ -208,6 +177,10 @@ class Prepared:
             ("prepared", f"{self.model.name}, {s.nv} velocities, {len(s.rows)} constraint rows"),
             ("coordinates", self.coordinates),
             ("velocities", ", ".join(self.names[:12]) + (", ..." if len(self.names) > 12 else "")),
+            *(
+                [("open stops", ", ".join(self.stops[:12]) + (", ..." if len(self.stops) > 12 else ""))]
+                * bool(self.stops)
+            ),
         ]
 
     def as_dict(self) -> dict[str, Any]:
@@ -220,28 +193,13 @@ class Prepared:
         """Return the lines as text."""
         return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
 
-    def _workspace(self, which: str = "moving") -> CompiledMechanism:
+    def _workspace(self) -> CompiledMechanism:
         """Return this thread's own workspace, with the angles of the start."""
-        found: CompiledMechanism | None = getattr(self._here, which, None)
+        found: CompiledMechanism | None = getattr(self._here, "workspace", None)
         if found is None:
-            found = self._start.compiled.again() if which == "moving" else self._without_forces()
-            setattr(self._here, which, found)
-        if which == "moving":
-            found.z = self._start.compiled.z.copy()
+            found = self._here.workspace = self._start.compiled.again()
+        found.z = self._start.compiled.z.copy()
         return found
-
-    def _without_forces(self) -> CompiledMechanism:
-        """Return bodies and joints alone, with a mass matrix; drivers would override the coordinates that they
-        prescribe.
-        """
-        c = self._start.compiled
-        bare = self.model.copy()
-        bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
-        # a body with a given angular velocity does not become a point mass when forces and drivers are removed
-        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)
-        rigid = {name for name, why in point_mass_obstacles(self.model).items() if why}
-        bare.bodies = [replace(b, angular_velocity=still) if b.name in rigid else b for b in bare.bodies]
-        return compile_mechanism(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
 
     def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> CompiledMechanism:
         c = self._at(self._workspace(), t, q, v, MOTION)
@@ -320,18 +278,6 @@ class Prepared:
             out.append(found.astype(float))
         return out[0], out[1]
 
-    def _body_of_frame(self, c: CompiledMechanism, name: str) -> tuple[int, np.ndarray, np.ndarray]:
-        """Return the row of the body that carries a frame (-1: ground), and its origin and axes in the body."""
-        if name == GROUND:
-            return -1, np.zeros(3), np.eye(3)
-        e = self.model[name]
-        if e.category not in ("bodies", "frames"):
-            raise ModelError(f"{e.title} has no pose; name a body or a frame")
-        p, R = c.values.poses.named(name)
-        body = c.values.bodies[e.body if isinstance(e, Frame) else name]
-        b = c.structure.place[e.body if isinstance(e, Frame) else name]
-        return b, body.R.T @ (p - body.c), body.R.T @ R
-
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareOptions(Options):
@@ -339,9 +285,13 @@ class PrepareOptions(Options):
 
     coordinates: str
     parameters: Mapping[str, float] | None
+    specialize: bool
 
 
 def prepare(model: Model, o: PrepareOptions) -> Prepared:
     """Return the prepared mechanism: see `Mechanism.prepare`."""
-    refuse_unsupported(model, "prepare", acts_while_sliding)
-    return Prepared(find_initial_state(model.snapshot(), 0.0, o.parameters, None, o.coordinates))
+    stops = {e.name: None for e in model.limits if isinstance(e, Limit) and e.stiffness is None}
+    free = model.changed(stops) if stops else model
+    refuse_unsupported(free, "prepare", acts_while_sliding)
+    start = find_initial_state(free.snapshot(), 0.0, o.parameters, None, o.coordinates)
+    return Prepared(start, model.snapshot(), tuple(stops), o.specialize)

@@ -42,13 +42,12 @@ def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.
 def triad(z: np.ndarray) -> np.ndarray:
     """Return right-handed axes (columns) with the given unit vector as z; the world's axes if z is vertical.
 
-    The imaginary part of a complex z tilts the vertical by the shortest way.
+    Near the vertical the world's axes are tilted the shortest way.
     """
     if z[2].real > 1.0 - 1e-12:
-        if not np.iscomplexobj(z):
-            return np.eye(3)
-        dx, dy, _ = z.imag
-        return np.eye(3) + 1j * np.array([[0.0, 0.0, dx], [0.0, 0.0, dy], [-dx, -dy, 0.0]])
+        x, y, c = z
+        s = 1.0 / (1.0 + c)
+        return np.array([[1.0 - s * x * x, -s * x * y, x], [-s * x * y, 1.0 - s * y * y, y], [-x, -y, c]])
     helper = np.eye(3)[int(np.argmin(np.abs(real_parts(z))))]
     x = np.array(cross(helper, z))  # NumPy's own takes ten times as long
     x = x / np.sqrt((x * x).sum())

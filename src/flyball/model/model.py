@@ -189,6 +189,10 @@ class Model:
         """Return the names of all parts, in the order they were added."""
         return list(self.by_name)
 
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a part of that name."""
+        return name in self.by_name
+
     def __getitem__(self, name: str) -> Any:
         """Return the part with that name."""
         if name not in self.by_name:

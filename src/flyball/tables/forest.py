@@ -214,7 +214,7 @@ def joint_bodies(model: Model, joint: Joint) -> tuple[str, str]:
 
 
 def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
-    """Bodies with their tree joints, parents first.
+    """Bodies with their tree joints, parents first; of a part that is not connected to ground the first body is free.
 
     Raises
     ------
@@ -233,10 +233,9 @@ def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
     _append_chains(near, GROUND, seen, out)
     for body in model.bodies:
         if body.name not in seen:
-            root = _central_body(near, body.name)
-            out.append(TreeBody(root))
-            seen.add(root)
-            _append_chains(near, root, seen, out)
+            out.append(TreeBody(body.name))
+            seen.add(body.name)
+            _append_chains(near, body.name, seen, out)
     if sum(h.joint is not None for h in out) != len(tree):
         raise ModelError("the tree joints close a loop")
     return out
@@ -255,28 +254,6 @@ def _append_chains(near: dict, root: str, reached: set[str], out: list[TreeBody]
                 break
         else:
             stack.pop()
-
-
-def _central_body(near: dict, start: str) -> str:
-    """Central body of a connected part: the one whose farthest body is nearest, so that chains are shortest."""
-
-    def farthest(root: str) -> list[str]:
-        way, order = {root: root}, [root]
-        for here in order:
-            for _, there, _ in near[here]:
-                if there not in way and there != GROUND:
-                    way[there] = here
-                    order.append(there)
-        last, path = order[-1], []
-        while last != root:
-            path.append(last)
-            last = way[last]
-        return [*path, root]
-
-    if not near[start]:
-        return start
-    path = farthest(farthest(start)[0])
-    return path[len(path) // 2]
 
 
 def body_table(s: Structure) -> None:

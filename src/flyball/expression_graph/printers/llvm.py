@@ -307,10 +307,17 @@ class Module:
         As in ``define double @name(arguments)``; ``%t`` is the base "t".
     based : callable
         Base -> lines that compute its address ``%base``; none if it is an argument.
+    lines_of : subclass of Lines
+        Of another type of numbers.
     """
 
-    def __init__(self, arguments: str, based: Callable[[str], list[str]]) -> None:
-        self.arguments, self.based = arguments, based
+    def __init__(
+        self,
+        arguments: str,
+        based: Callable[[str], list[str]],
+        lines_of: Callable[[Module, Mapping[int, Place]], Lines] | None = None,
+    ) -> None:
+        self.arguments, self.based, self.lines_of = arguments, based, lines_of or Lines
         self.texts: list[str] = []
         self.bases: list[str] = []
         self.tables: dict[bytes, Sequence[float]] = {}
@@ -330,7 +337,7 @@ class Module:
 
     def add(self, p: Procedure) -> None:
         """Print a procedure."""
-        out = _Lines(self, p.inputs)
+        out = self.lines_of(self, p.inputs)
         order = depth_first(p.results, p.inputs) if p.deep else ordered_operations(p.results, p.inputs)
         out.chains = parallel_chains(order, p.inputs)
         overwritten = {place for place, _ in p.stores}
@@ -342,7 +349,7 @@ class Module:
             if isinstance(x, Node) and x.op != NUMBER:
                 waiting.setdefault(x.index, []).append(place)
             else:
-                out.put(place, constant(float(x)))
+                out.put(place, out.number(float(x)))
         for x in order:
             if x.op != NUMBER:
                 name = out.value(x)
@@ -350,7 +357,7 @@ class Module:
                     out.put(place, name)
         out.end(p)
         head = [line for base in sorted(out.used) for line in self.based(base)]
-        lines = [f"define double @{p.name}({self.arguments}) nounwind {{", *head, *out.lines, "}"]
+        lines = [f"define {out.real} @{p.name}({self.arguments}) nounwind {{", *head, *out.lines, "}"]
         self.texts.append("\n".join(lines))
 
     def __str__(self) -> str:
@@ -369,8 +376,11 @@ class Module:
         return "\n\n".join([DECLARATIONS, *data, *spline, *self.texts, "\n".join(told)]) + "\n"
 
 
-class _Lines:
-    """The lines of one function."""
+class Lines:
+    """The lines of one function; a subclass may print for another type of numbers, with other reads and stores."""
+
+    real = "double"
+    condition = "i1"
 
     def __init__(self, module: Module, reads: Mapping[int, Place]) -> None:
         self.module, self.reads = module, reads
@@ -381,41 +391,52 @@ class _Lines:
         self.pieces = SplineSegments(self.new)
 
     def new(self, text: str) -> str:
+        """Write an instruction and return the name of its value."""
         name = f"%x{len(self.lines)}"
         self.lines.append(f"{name} = {text}")
         return name
 
     def address(self, place: Place) -> str:
+        """Code for the address of a place."""
         self.used.add(place[0])
         return self.new(f"getelementptr inbounds double, ptr %{place[0]}, i64 {place[1]}")
 
     def read(self, place: Place) -> str:
+        """Code that loads a value."""
         if place[0] == "t":
             return "%t"
         return self.new(f"load double, ptr {self.address(place)}, {self.module.scope(place[0])}")
 
     def put(self, place: Place, name: str) -> None:
+        """Code that stores a value."""
         self.lines.append(f"store double {name}, ptr {self.address(place)}, {self.module.scope(place[0])}")
 
+    def number(self, x: float) -> str:
+        """A number as an exact constant."""
+        return constant(x)
+
     def name(self, x: Any) -> str:
+        """Name of a value, or a number as a constant."""
         if not isinstance(x, Node):
-            return constant(float(x))
-        return constant(x.value) if x.op == NUMBER else self.names[x.index]
+            return self.number(float(x))
+        return self.number(x.value) if x.op == NUMBER else self.names[x.index]
 
     def value(self, x: Node) -> str:
+        """Name of the value of an expression, which is loaded or computed if it was not yet."""
         if x.index not in self.names:
             found = self.reads.get(x.index)
             self.names[x.index] = self.operation(x) if found is None else self.read(found)
         return self.names[x.index]
 
     def operation(self, x: Node) -> str:
+        """Code for an operation."""
         if x.index in self.chains:
             return self.largest(*self.chains[x.index])
         a = [self.name(y) for y in x.args]
         if x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0:
-            return self.new(f"fneg double {a[1]}")
+            return self.new(f"fneg {self.real} {a[1]}")
         if x.op in INFIX:
-            return self.new(f"{INFIX[x.op]} double {a[0]}, {a[1]}")
+            return self.new(f"{INFIX[x.op]} {self.real} {a[0]}, {a[1]}")
         if x.op in LIBRARY:
             return self.new(f"call double @{LIBRARY[x.op]}(double {a[0]})")
         if x.op in TWO_ARGUMENTS:
@@ -427,7 +448,7 @@ class _Lines:
             return self.pieces.value((self.module.table(numbers), numbers), order, a[0])
         details = getattr(x.data, "details", {})
         if "constant" in details:
-            return constant(details["constant"])
+            return self.number(details["constant"])
         raise UnsupportedOperation(getattr(x.data, "name", x.op))
 
     def largest(self, started: Node | None, others: Sequence[Node]) -> str:
@@ -435,49 +456,51 @@ class _Lines:
         names = [self.name(y) for y in (*((started,) if started is not None else ()), *others)]
         while len(names) > 1:
             a, b = names.pop(0), names.pop(0)
-            names.append(self.chosen(self.new(f"fcmp ogt double {a}, {b}"), a, b))
+            names.append(self.chosen(self.new(f"fcmp ogt {self.real} {a}, {b}"), a, b))
         return names[0]
 
     def chosen(self, condition: str, a: str, b: str) -> str:
-        return self.new(f"select i1 {condition}, double {a}, double {b}")
+        """Code for a where a condition is true, else b."""
+        return self.new(f"select {self.condition} {condition}, {self.real} {a}, {self.real} {b}")
 
     def end(self, p: Procedure) -> None:
+        """Code for the returned value and the checks."""
         value = self.name(p.returned)
         for nodes, what, number in reversed(p.checks):
             names = [self.name(x) for x in nodes]
             if what == "finite":  # x - x is 0 if x is
-                names = [self.new(f"fsub double {x}, {x}") for x in names]
+                names = [self.new(f"fsub {self.real} {x}, {x}") for x in names]
                 while len(names) > 1:
                     pairs = zip(names[::2], names[1::2], strict=False)
-                    names = [self.new(f"fadd double {x}, {y}") for x, y in pairs] + names[len(names) // 2 * 2 :]
+                    names = [self.new(f"fadd {self.real} {x}, {y}") for x, y in pairs] + names[len(names) // 2 * 2 :]
             for x in names:
-                bad = self.new(f"fcmp {FAILED_CHECKS[what]} double {x}, {constant(0.0)}")
-                value = self.chosen(bad, constant(number), value)
-        self.lines.append(f"ret double {value}")
+                bad = self.new(f"fcmp {FAILED_CHECKS[what]} {self.real} {x}, {self.number(0.0)}")
+                value = self.chosen(bad, self.number(number), value)
+        self.lines.append(f"ret {self.real} {value}")
 
 
-def _minimum(o: _Lines, a: str, b: str) -> str:
-    first = o.new(f"fcmp ole double {a}, {b}")
-    return o.chosen(o.new(f"or i1 {first}, {o.new(f'fcmp uno double {a}, {a}')}"), a, b)
+def _minimum(o: Lines, a: str, b: str) -> str:
+    first = o.new(f"fcmp ole {o.real} {a}, {b}")
+    return o.chosen(o.new(f"or {o.condition} {first}, {o.new(f'fcmp uno {o.real} {a}, {a}')}"), a, b)
 
 
-def _maximum(o: _Lines, a: str, b: str) -> str:
-    first = o.new(f"fcmp oge double {a}, {b}")
-    return o.chosen(o.new(f"or i1 {first}, {o.new(f'fcmp uno double {a}, {a}')}"), a, b)
+def _maximum(o: Lines, a: str, b: str) -> str:
+    first = o.new(f"fcmp oge {o.real} {a}, {b}")
+    return o.chosen(o.new(f"or {o.condition} {first}, {o.new(f'fcmp uno {o.real} {a}, {a}')}"), a, b)
 
 
-def _sign(o: _Lines, a: str) -> str:
-    below = o.chosen(o.new(f"fcmp olt double {a}, {constant(0.0)}"), constant(-1.0), constant(0.0))
-    some = o.chosen(o.new(f"fcmp ogt double {a}, {constant(0.0)}"), constant(1.0), below)
-    return o.chosen(o.new(f"fcmp uno double {a}, {a}"), a, some)
+def _sign(o: Lines, a: str) -> str:
+    below = o.chosen(o.new(f"fcmp olt {o.real} {a}, {o.number(0.0)}"), o.number(-1.0), o.number(0.0))
+    some = o.chosen(o.new(f"fcmp ogt {o.real} {a}, {o.number(0.0)}"), o.number(1.0), below)
+    return o.chosen(o.new(f"fcmp uno {o.real} {a}, {a}"), a, some)
 
 
-def _rounded(o: _Lines, a: str) -> str:
-    return o.new(f"call double @llvm.floor.f64(double {o.new(f'fadd double {a}, {constant(0.5)}')})")
+def _rounded(o: Lines, a: str) -> str:
+    return o.new(f"call double @llvm.floor.f64(double {o.new(f'fadd {o.real} {a}, {o.number(0.5)}')})")
 
 
-def _choose(o: _Lines, x: str, a: str, b: str) -> str:
-    return o.chosen(o.new(f"fcmp ogt double {x}, {constant(0.0)}"), a, b)
+def _choose(o: Lines, x: str, a: str, b: str) -> str:
+    return o.chosen(o.new(f"fcmp ogt {o.real} {x}, {o.number(0.0)}"), a, b)
 
 
 BRANCHING: dict[str, Callable[..., str]] = {

@@ -1,0 +1,596 @@
+"""Recursive dynamics on plain arrays, at one state or at many: the methods of `Prepared` that need no constraint."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..codegen.batch_code import LARGEST_ANGLE, TASKS, BatchCode, ForwardDerivativesCode, batch_code
+from ..compiler.kernels import BoundKernel, StructBuffer
+from ..engine.batch_dynamics import (
+    CENTROIDAL_MATRIX,
+    FORWARD_DERIVATIVES,
+    FORWARD_DYNAMICS,
+    FRAME_JACOBIAN,
+    FRAME_JACOBIAN_RATE,
+    FRAME_POSE,
+    INVERSE_DERIVATIVES,
+    INVERSE_DYNAMICS,
+    MASS_MATRIX,
+    MOMENTUM,
+    BatchArrays,
+    FrameOnBody,
+    batch_kernel,
+)
+from ..engine.entry_point import pooled_work, struct_tables
+from ..engine.recursive_dynamics import tree_dynamics, velocity_paths
+from ..errors import AnalysisError, ModelError
+from ..model.body import GROUND, Frame
+from ..tables.table_definitions import FREE, SPHERICAL, System
+
+if TYPE_CHECKING:
+    from ..assembly.assembled_state import Assembly
+
+Array = np.ndarray
+_NO_COLUMNS = np.zeros((1, 0, 0))
+
+
+class InverseDynamicsDerivatives(NamedTuple):
+    """Derivatives of generalised forces tau (rows) along each velocity (columns): (nv, nv), or (k, nv, nv).
+
+    By position: for a displacement of the bodies along the velocity, as `Prepared.step` makes it.
+    """
+
+    by_position: Array
+    by_velocity: Array
+    by_acceleration: Array
+    """The mass matrix."""
+
+
+class ForwardDynamicsDerivatives(NamedTuple):
+    """Derivatives of accelerations (rows) along each velocity (columns): (nv, nv), or (k, nv, nv).
+
+    By position: for a displacement of the bodies along the velocity, as `Prepared.step` makes it.
+    """
+
+    by_position: Array
+    by_velocity: Array
+    by_force: Array
+    """The inverse of the mass matrix."""
+
+
+class _Workspace:
+    """Tables and workspace of one thread."""
+
+    def __init__(self, x: BatchDynamics) -> None:
+        s = x.structure
+        work = pooled_work(s, x.system, np.float64)
+        self.parts = (
+            x.tables, work, StructBuffer(x.paths), StructBuffer(tree_dynamics(len(x.system.tree.parent), s.nq, s.nv))
+        )  # fmt: skip
+
+        self.single: dict[tuple[int, str | None], OneState] = {}
+
+    def bound(self, arrays: BatchArrays) -> BoundKernel:
+        """The kernel with arrays of states."""
+        return BoundKernel(batch_kernel, *self.parts, StructBuffer(arrays))
+
+
+class OneState:
+    """Arrays for a task at one state, with the kernel bound to them: a call from Python takes a few microseconds.
+
+    Attributes
+    ----------
+    states : list of ndarray
+        Coordinates, velocities, accelerations or forces, as far as the task needs them.
+    results : list of ndarray
+    """
+
+    def __init__(
+        self,
+        x: BatchDynamics,
+        task: int,
+        lengths: Sequence[int],
+        shapes: Sequence[tuple[int, ...]],
+        frame: FrameOnBody,
+    ) -> None:
+        code = x.code(task)
+        self.states = [np.zeros((1, n)) for n in lengths]
+        self.results = [np.zeros(shape) for shape in shapes]
+        if code is None:
+            flat = [r.reshape(1, -1, r.shape[-1]) for r in self.results]
+            self.call: Callable[[], int] = partial(x.workspace.bound(_batch_arrays(self.states, flat, frame)), task)
+        else:
+            self.call = code.bound(self.states, self.results)
+        self.quaternions, self.largest = x.quaternions, LARGEST_ANGLE if code is not None else math.inf
+
+    def evaluate(self, given: Sequence[Array]) -> bool:
+        """Evaluate; False if the arguments or the result are not ordinary, and `RecursiveMethods` must look closer."""
+        total = 0.0
+        for mine, x in zip(self.states, given, strict=True):
+            mine[0] = x
+            total += np.add.reduce(x)
+        if not math.isfinite(total):
+            return False
+        q = given[0]
+        if self.largest < math.inf and np.abs(q).max(initial=0.0) > self.largest:
+            return False
+        if any(not (q[k] or q[k + 1] or q[k + 2] or q[k + 3]) for k, _ in self.quaternions):
+            return False
+        return self.call() == 1
+
+
+class BatchDynamics:
+    """The tables that recursive dynamics reads; in them no driver prescribes a coordinate.
+
+    Parameters
+    ----------
+    start : Assembly
+    names : sequence of str
+        Of the velocities, for messages.
+    specialize : bool
+        Whether machine code is generated for the mechanism.
+    """
+
+    def __init__(self, start: Assembly, names: Sequence[str], specialize: bool) -> None:
+        c = start.compiled
+        self._specialize = specialize
+        self._code: dict[int, BatchCode | ForwardDerivativesCode | None] = {}
+        S: System = c.values.system
+        self.compiled, self.structure, self.names = c, c.structure, names
+        self.system = S._replace(tree=S.tree._replace(law=np.full_like(S.tree.law, -1)))
+        self.tables = struct_tables(self.structure, self.system)
+        self.paths = velocity_paths(S.tree)
+        self.quaternions = [
+            (int(S.tree.q[b]) + (3 if S.tree.joint[b] == FREE else 0), int(S.tree.v[b]))
+            for b in np.flatnonzero((S.tree.joint == FREE) | (S.tree.joint == SPHERICAL)).tolist()
+        ]
+        self._thread = threading.local()
+
+    @property
+    def workspace(self) -> _Workspace:
+        """This thread's workspace."""
+        found: _Workspace | None = getattr(self._thread, "workspace", None)
+        if found is None:
+            found = self._thread.workspace = _Workspace(self)
+        return found
+
+    def frame(self, name: str) -> FrameOnBody:
+        """A body's reference frame, or a named frame."""
+        if name == GROUND:
+            return _frame_on_body(-1, np.zeros(3), np.eye(3))
+        e = self.structure.model[name]
+        if e.category not in ("bodies", "frames"):
+            raise ModelError(f"{e.title} has no pose; name a body or a frame")
+        values = self.compiled.values
+        p, R = values.poses.named(name)
+        carrier = e.body if isinstance(e, Frame) else name
+        if carrier == GROUND:
+            return _frame_on_body(-1, p, R)
+        body = values.bodies[carrier]
+        return _frame_on_body(self.structure.place[carrier], body.R.T @ (p - body.c), body.R.T @ R)
+
+    def code(self, task: int) -> BatchCode | ForwardDerivativesCode | None:
+        """Machine code generated for this mechanism; None if none is wanted, or possible."""
+        if not self._specialize or task not in TASKS:
+            return None
+        if task not in self._code:
+            self._code[task] = batch_code(self.structure, self.system, self.paths, task)
+        return self._code[task]
+
+    def evaluate(
+        self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody, threads: int
+    ) -> None:
+        """Evaluate at all states (k, n), into results (k, rows, columns)."""
+        code = self.code(task)
+        if code is not None and np.abs(states[0]).max(initial=0.0) > LARGEST_ANGLE:
+            code = None
+
+        def part(begin: int, end: int) -> int:
+            """Evaluate some states; returns the first at which that failed, or ``end``."""
+            mine, out = [x[begin:end] for x in states], [x[begin:end] for x in results]
+            done = code.bound(mine, out)() if code is not None else 0
+            if done < len(mine[0]):  # also to find the state that fails among those of a block
+                rest = _batch_arrays([x[done:] for x in mine], [x[done:] for x in out], frame)
+                done += self.workspace.bound(rest)(task)
+            return begin + done
+
+        ends = np.linspace(0, len(states[0]), threads + 1).astype(int).tolist()
+        if threads == 1:
+            failed = [part(*ends)]
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                failed = list(pool.map(part, ends[:-1], ends[1:]))
+        for i, end in zip(failed, ends[1:], strict=True):
+            if i < end:
+                self.refuse(i, states)
+
+    def refuse(self, i: int, states: Sequence[Array]) -> None:
+        """Raise the error of a state at which the accelerations are not determined."""
+        inertia = np.zeros((1, len(self.names), len(self.names)))
+        self.workspace.bound(_batch_arrays([x[i : i + 1] for x in states], [inertia], _NO_FRAME))(MASS_MATRIX)
+        d = int(np.argmin(np.diagonal(inertia[0])))
+        raise AnalysisError(
+            f"{self.structure.model.name!r}: the accelerations are not determined at state {i}: the mass matrix is "
+            f"singular there; the smallest inertia is {inertia[0, d, d]:.3g}, along {self.names[d]!r}. Give the bodies "
+            f"that it moves mass and inertia"
+        )
+
+
+def _frame_on_body(b: int, p: Array, R: Array) -> FrameOnBody:
+    return FrameOnBody(np.array([b]), np.array(p, float), np.array(R, float).reshape(9))
+
+
+_NO_FRAME = _frame_on_body(-1, np.zeros(3), np.eye(3))
+
+
+def _batch_arrays(states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody) -> BatchArrays:
+    padded: list[Array] = [*states, *[states[0][:, :0]] * (3 - len(states))]
+    outputs: list[Array] = [*results, *[_NO_COLUMNS] * (3 - len(results))]
+    return BatchArrays(padded[0], padded[1], padded[2], frame, outputs[0], outputs[1], outputs[2])
+
+
+BOUND_METHODS = {
+    "rnea": (INVERSE_DYNAMICS, 1),
+    "aba": (FORWARD_DYNAMICS, 1),
+    "rnea_derivatives": (INVERSE_DERIVATIVES, 3),
+    "aba_derivatives": (FORWARD_DERIVATIVES, 3),
+}
+"""Methods that can be bound to arrays: task, number of results."""
+
+
+class RecursiveMethods:
+    """Recursive dynamics of the bodies and joints of a prepared mechanism, at one state or at many.
+
+    Every argument has one state, ``(nq,)`` or ``(nv,)``, or one in each of k rows; an argument with one state is used
+    with every row of the others. The result has k rows then. ``out`` takes the result (float, without gaps; for
+    several results a tuple); ``threads`` divides the states among threads, with the same result to the last bit.
+    Generalised forces and velocities are in the order of `Prepared.names`, in SI units.
+
+    These methods see bodies, tree joints and gravity. Springs, drivers, contacts and other forces are not part of them:
+    `forces` and `acceleration` include these. Neither are joints that close loops: inverse dynamics and the mass matrix
+    are those of the tree (loops add G^T lam), forward dynamics is refused. Non-finite numbers, wrong shapes and
+    quaternions of length zero raise `ModelError`; other quaternions are normalised.
+    """
+
+    _start: Assembly
+    q: Array
+    v: Array
+    names: tuple[str, ...]
+    rows: tuple[str, ...]
+    model: Any
+    specialized: bool
+
+    def rnea(self, q: Array, v: Array, a: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Inverse dynamics: the generalised forces that give accelerations (recursive Newton-Euler algorithm).
+
+        tau = M(q) a + c(q, v) - g(q). Featherstone (2008), table 5.1.
+
+        Parameters
+        ----------
+        q, v, a : array_like, (nq,), (nv,), (nv,), or k rows of these
+            Coordinates, velocities, accelerations [SI].
+        out : ndarray, optional
+            Array for the result.
+        threads : int
+            Number of threads.
+
+        Returns
+        -------
+        ndarray, (nv,) or (k, nv) [N, N m]
+        """
+        return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
+
+    def bias_forces(self, q: Array, v: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Forces at zero accelerations: Coriolis, centrifugal and gyroscopic ones less gravity, c(q, v) - g(q).
+
+        Returns
+        -------
+        ndarray, (nv,) or (k, nv) [N, N m]
+        """
+        return self.rnea(q, v, np.zeros(len(self.v)), out=out, threads=threads)
+
+    def gravity_forces(self, q: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Forces that hold the mechanism at rest against gravity, -g(q).
+
+        Returns
+        -------
+        ndarray, (nv,) or (k, nv) [N, N m]
+        """
+        rest = np.zeros(len(self.v))
+        return self.rnea(q, rest, rest, out=out, threads=threads)
+
+    def mass_matrix(self, q: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Mass matrix M(q) of the tree, symmetric, by the composite-rigid-body algorithm; also named ``crba``.
+
+        Featherstone (2008), table 6.2.
+
+        Returns
+        -------
+        ndarray, (nv, nv) or (k, nv, nv) [kg, kg m, kg m^2]
+        """
+        n = len(self.v)
+        return self._batch(MASS_MATRIX, (q,), ((n, n),), out, threads)[0]
+
+    crba = mass_matrix
+
+    def aba(self, q: Array, v: Array, tau: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Forward dynamics: the accelerations that generalised forces give, in O(n) (articulated bodies).
+
+        Featherstone (2008), table 7.1.
+
+        Parameters
+        ----------
+        q, v, tau : array_like, (nq,), (nv,), (nv,), or k rows of these
+            Coordinates, velocities, generalised forces [SI].
+        out : ndarray, optional
+            Array for the result.
+        threads : int
+            Number of threads.
+
+        Returns
+        -------
+        ndarray, (nv,) or (k, nv) [m/s^2, rad/s^2]
+
+        Raises
+        ------
+        AnalysisError
+            If joints close loops, or a velocity moves no inertia.
+        """
+        self._require_tree("aba")
+        return self._batch(FORWARD_DYNAMICS, (q, v, tau), ((len(self.v),),), out, threads)[0]
+
+    def rnea_derivatives(
+        self, q: Array, v: Array, a: Array, *, out: Sequence[Array] | None = None, threads: int = 1
+    ) -> InverseDynamicsDerivatives:
+        """Analytic derivatives of `rnea` by position, velocity and acceleration.
+
+        In the manner of Carpentier and Mansard (2018).
+
+        Returns
+        -------
+        InverseDynamicsDerivatives
+            Three arrays (nv, nv) or (k, nv, nv); the last is the mass matrix.
+        """
+        n = len(self.v)
+        return InverseDynamicsDerivatives(*self._batch(INVERSE_DERIVATIVES, (q, v, a), ((n, n),) * 3, out, threads))
+
+    def aba_derivatives(
+        self, q: Array, v: Array, tau: Array, *, out: Sequence[Array] | None = None, threads: int = 1
+    ) -> ForwardDynamicsDerivatives:
+        """Analytic derivatives of `aba` by position, velocity and generalised forces.
+
+        -M^-1 times those of `rnea`, and M^-1.
+
+        Returns
+        -------
+        ForwardDynamicsDerivatives
+            Three arrays (nv, nv) or (k, nv, nv).
+
+        Raises
+        ------
+        AnalysisError
+            If joints close loops, or a velocity moves no inertia.
+        """
+        self._require_tree("aba_derivatives")
+        n = len(self.v)
+        return ForwardDynamicsDerivatives(*self._batch(FORWARD_DERIVATIVES, (q, v, tau), ((n, n),) * 3, out, threads))
+
+    def pose(self, name: str, q: Array, *, threads: int = 1) -> tuple[Array, Array]:
+        """Forward kinematics: origin and axes of a body's reference frame or a named frame, in the world.
+
+        Returns
+        -------
+        position : ndarray, (3,) or (k, 3) [m]
+        rotation : ndarray, (3, 3) or (k, 3, 3)
+            The frame's axes as columns.
+        """
+        x = self._batch(FRAME_POSE, (q,), ((12,),), None, threads, name)[0]
+        return x[..., :3].copy(), x[..., 3:].reshape(*x.shape[:-1], 3, 3).copy()
+
+    def frame_jacobian(self, name: str, q: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Derivatives of a frame's velocity (rows 0 to 2) and angular velocity (3 to 5), world axes.
+
+        Returns
+        -------
+        ndarray, (6, nv) or (k, 6, nv)
+        """
+        return self._batch(FRAME_JACOBIAN, (q,), ((6, len(self.v)),), out, threads, name)[0]
+
+    def frame_jacobian_rate(
+        self, name: str, q: Array, v: Array, *, out: Array | None = None, threads: int = 1
+    ) -> Array:
+        """Rate of `frame_jacobian`: a frame's acceleration is J vdot + Jdot v.
+
+        Returns
+        -------
+        ndarray, (6, nv) or (k, 6, nv)
+        """
+        return self._batch(FRAME_JACOBIAN_RATE, (q, v), ((6, len(self.v)),), out, threads, name)[0]
+
+    def centre_of_mass(self, q: Array, *, threads: int = 1) -> Array:
+        """Centre of mass of all bodies, in the world.
+
+        Returns
+        -------
+        ndarray, (3,) or (k, 3) [m]
+        """
+        return self._momenta(q, np.zeros(len(self.v)), threads)[..., :3].copy()
+
+    def momentum(self, q: Array, v: Array, *, threads: int = 1) -> Array:
+        """Momentum and angular momentum about the centre of mass of all bodies, world axes (centroidal momentum).
+
+        Returns
+        -------
+        ndarray, (6,) or (k, 6) [kg m/s, kg m^2/s]
+        """
+        return self._momenta(q, v, threads)[..., 3:9].copy()
+
+    def energies(self, q: Array, v: Array, *, threads: int = 1) -> Array:
+        """Kinetic energy, and potential energy of gravity (zero at the world's origin), of all bodies.
+
+        Returns
+        -------
+        ndarray, (2,) or (k, 2) [J]
+        """
+        return self._momenta(q, v, threads)[..., 9:].copy()
+
+    def centroidal_momentum_matrix(self, q: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+        """Matrix A of the centroidal momentum A(q) v: momentum (rows 0 to 2), angular momentum (3 to 5).
+
+        Orin, Goswami and Lee (2013).
+
+        Returns
+        -------
+        ndarray, (6, nv) or (k, 6, nv)
+        """
+        return self._batch(CENTROIDAL_MATRIX, (q,), ((6, len(self.v)),), out, threads)[0]
+
+    def bind(self, method: str, q: Array, v: Array, a: Array, out: Any) -> Callable[[], None]:
+        """A call of `rnea`, `aba` or their derivatives on fixed arrays, without checks: the fastest from Python.
+
+        Parameters
+        ----------
+        method : {"rnea", "aba", "rnea_derivatives", "aba_derivatives"}
+        q, v, a : ndarray
+            Float arrays without gaps, read at each call: coordinates, velocities, accelerations (or forces, for
+            ``aba``), of one state or of k. Non-finite numbers in them give non-finite results.
+        out : ndarray, or tuple of three for derivatives
+            Arrays for the results.
+
+        Returns
+        -------
+        callable
+            Without arguments; it raises AnalysisError where accelerations are not determined. Of one thread at a time.
+        """
+        if method not in BOUND_METHODS:
+            raise ModelError(f"{method!r} cannot be bound; choose one of {', '.join(BOUND_METHODS)}")
+        task, results = BOUND_METHODS[method]
+        if method.startswith("aba"):
+            self._require_tree(method)
+        n, x = len(self.v), self._recursive
+        given, k = self._states((q, v, a))
+        if any(not np.shares_memory(mine, theirs) for mine, theirs in zip(given, (q, v, a), strict=True) if mine.size):
+            raise ModelError("q, v and a must be arrays of float64 without gaps, each with as many states")
+        shape = (n,) if results == 1 else (n, n)
+        arrays = _result_arrays([(*(() if k is None else (k,)), *shape)] * results, out)
+        flat = [r.reshape(len(given[0]), -1, n) for r in arrays]
+        code = x.code(task)
+        evaluate: Callable[[], int]
+        if code is None:
+            evaluate = partial(x.workspace.bound(_batch_arrays(given, flat, _NO_FRAME)), task)
+        else:
+            evaluate = code.bound(given, flat)
+
+        def call() -> None:
+            if evaluate() < len(given[0]):
+                x.evaluate(task, given, flat, _NO_FRAME, 1)
+
+        return call
+
+    def _momenta(self, q: Array, v: Array, threads: int) -> Array:
+        return self._batch(MOMENTUM, (q, v), ((11,),), None, threads)[0]
+
+    @property
+    def _recursive(self) -> BatchDynamics:
+        found: BatchDynamics | None = vars(self).get("_batch_dynamics")
+        if found is None:
+            found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names, self.specialized)
+        return found
+
+    def _require_tree(self, method: str) -> None:
+        if self.rows:
+            closing = ", ".join(dict.fromkeys(row.partition(":")[0] for row in self.rows))
+            raise AnalysisError(
+                f"{method} is for mechanisms whose joints form a tree; in these coordinates {self.model.name!r} has "
+                f"constraint equations of {closing}. p.acceleration and p.multipliers solve them"
+            )
+
+    def _batch(
+        self,
+        task: int,
+        given: Sequence[Any],
+        shapes: Sequence[tuple[int, ...]],
+        out: Any,
+        threads: int,
+        frame: str | None = None,
+    ) -> list[Array]:
+        """Check the arguments, evaluate, and return results of the given shapes for each state."""
+        x = self._recursive
+        if out is None and threads == 1 and (found := self._one_state(task, given, shapes, frame)) is not None:
+            return found
+        states, k = self._states(given)
+        if not isinstance(threads, int) or threads < 1:
+            raise ModelError(f"threads is {threads!r}; it must be a number of threads, 1 or more")
+        full = [(*(() if k is None else (k,)), *shape) for shape in shapes]
+        results = _result_arrays(full, out)
+        flat = [r.reshape(len(states[0]), -1, s[-1]) for r, s in zip(results, shapes, strict=True)]
+        x.evaluate(task, states, flat, x.frame(frame) if frame is not None else _NO_FRAME, threads)
+        return results
+
+    def _one_state(
+        self, task: int, given: Sequence[Any], shapes: Sequence[tuple[int, ...]], frame: str | None
+    ) -> list[Array] | None:
+        """Results at one state; None if there are several, or something is not ordinary."""
+        x = self._recursive
+        lengths = (len(self.q), len(self.v), len(self.v))[: len(given)]
+        for a, n in zip(given, lengths, strict=True):
+            if type(a) is not np.ndarray or a.shape != (n,) or a.dtype != np.float64:
+                return None
+        known = x.workspace.single
+        if (task, frame) not in known:
+            at = x.frame(frame) if frame is not None else _NO_FRAME
+            known[task, frame] = OneState(x, task, lengths, shapes, at)
+        one = known[task, frame]
+        return [r.copy() for r in one.results] if one.evaluate(given) else None
+
+    def _states(self, given: Sequence[Any]) -> tuple[list[Array], int | None]:
+        """Arguments as arrays of rows, and their number: None for one state."""
+        arrays, k = [], None
+        for name, value, n in zip(("q", "v", "a"), given, (len(self.q), len(self.v), len(self.v)), strict=False):
+            found = np.asarray(value)
+            if found.dtype.kind not in "iuf":
+                raise ModelError(f"{name} contains {found.dtype.name} numbers; they must be real")
+            if found.ndim not in (1, 2) or found.shape[-1] != n:
+                raise ModelError(
+                    f"{name} has the shape {found.shape}; {self.model.name!r} has {n} numbers there in these "
+                    f"coordinates: ({n},) for one state, (k, {n}) for k states"
+                )
+            if not math.isfinite(found.sum()) and not np.isfinite(found).all():
+                raise ModelError(f"{name} of {self.model.name!r} is not finite")
+            if found.ndim == 2:
+                if k not in (None, len(found)):
+                    raise ModelError(f"{name} has {len(found)} states, and the arguments before it {k}")
+                k = len(found)
+            arrays.append(found)
+        rows = 1 if k is None else k
+        states = [
+            np.ascontiguousarray(np.broadcast_to(x, (rows, x.shape[-1])) if x.ndim == 1 else x, np.float64)
+            for x in arrays
+        ]
+        for at, d in self._recursive.quaternions:
+            if not np.all(np.any(states[0][:, at : at + 4] != 0.0, axis=1)):
+                raise ModelError(
+                    f"q[{at}:{at + 4}], the quaternion beside {self.names[d]!r}, is zero; it must be a rotation"
+                )
+        return states, k
+
+
+def _result_arrays(shapes: Sequence[tuple[int, ...]], out: Any) -> list[Array]:
+    """Arrays for results: new ones, or those of ``out``, which are checked."""
+    if out is None:
+        return [np.empty(shape) for shape in shapes]
+    given = list(out) if isinstance(out, tuple | list) else [out]
+    for shape, x in zip(shapes, given, strict=False):
+        fits = isinstance(x, np.ndarray) and x.shape == shape and x.dtype == np.float64 and x.flags.c_contiguous
+        if not fits or not x.flags.writeable:
+            raise ModelError(f"out must be an array of float64 of the shape {shape}, without gaps and writeable")
+    if len(given) != len(shapes):
+        raise ModelError(f"out must contain {len(shapes)} arrays, not {len(given)}")
+    return given

@@ -1,0 +1,479 @@
+"""Reading of robots in URDF, the XML format of ROS: links become bodies, joints become joints with their limits.
+
+A link is a body whose reference frame is the link's frame; the drawn configuration is that of zero joint values, with
+the root link's frame at the world's origin. A link without mass and inertia that is rigidly connected to another is a
+`Frame`. Every tag and attribute that is not used is listed in a `ModelWarning`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+from xml.parsers import expat
+
+import numpy as np
+
+from ..errors import ModelError, ModelWarning, warn_user
+from ..forces.clutch import Brake
+from ..forces.coordinate_spring import CoordinateSpring
+from ..forces.limit import Limit
+from ..joints.coupler import Coupler
+from ..joints.fixed import Fixed
+from ..joints.planar import Planar
+from ..joints.prismatic import Prismatic
+from ..joints.revolute import Revolute
+from .body import GROUND, Body, Frame, Ground, Initial
+from .element import Element
+from .model import Model
+from .shapes.box import Box
+from .shapes.cylinder import Cylinder
+from .shapes.mesh import MESH_FORMATS, Mesh
+from .shapes.solid import Solid
+from .shapes.sphere import Sphere
+
+T = TypeVar("T", bound=Model)
+
+ROUNDING = 1e-9  # of principal moments, relative to the largest: files round their numbers
+MAX_LISTED = 3  # of lines or files in a warning
+
+COORDINATES = {"revolute": "angle", "continuous": "angle", "prismatic": "displacement"}
+"""Coordinate of each type of joint that has one."""
+JOINT_TYPES = (*COORDINATES, "fixed", "floating", "planar")
+UNDERSTOOD = {
+    "robot": {"name", "link", "joint", "material", "version"},
+    "link": {"name", "inertial", "visual", "collision"},
+    "inertial": {"origin", "mass", "inertia"},
+    "mass": {"value"},
+    "inertia": {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"},
+    "origin": {"xyz", "rpy"},
+    "visual": {"name", "origin", "geometry", "material"},
+    "collision": {"name", "origin", "geometry"},
+    "geometry": {"box", "cylinder", "sphere", "mesh"},
+    "box": {"size"},
+    "cylinder": {"radius", "length"},
+    "sphere": {"radius"},
+    "mesh": {"filename", "scale"},
+    "material": {"name", "color", "texture"},
+    "color": {"rgba"},
+    "joint": {"name", "type", "origin", "parent", "child", "axis", "limit", "dynamics", "mimic"},
+    "parent": {"link"},
+    "child": {"link"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper"},
+    "dynamics": {"damping", "friction"},
+    "mimic": {"joint", "multiplier", "offset"},
+}
+"""Tags, with the attributes and tags in them that are used."""
+
+
+class _Element(ET.Element):
+    """An element of XML that knows its line."""
+
+    line = 0
+
+
+@dataclass
+class _Joint:
+    """A joint as it is written."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: np.ndarray
+    axis: np.ndarray
+    tag: ET.Element
+
+
+def load_urdf(path: Path, make: Callable[..., T], floating: bool = False) -> T:
+    """Read a robot from a URDF file.
+
+    Parameters
+    ----------
+    path : Path
+    make : callable
+        The class of the mechanism.
+    floating : bool
+        Whether the root link is a free body; by default it is fixed to ground.
+
+    Returns
+    -------
+    Mechanism
+        With standard gravity along -z.
+
+    Raises
+    ------
+    ModelError
+        Naming file, line and element, if the file is no URDF, is incomplete, or its joints form no tree.
+    """
+    return _Reader(path).mechanism(make, floating)
+
+
+class _Reader:
+    """One file being read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.robot = self._parsed()
+        self.links = self._named("link")
+        self.joints = [self._joint(tag) for tag in self._named("joint").values()]
+        self.names: dict[str, str] = {}
+        self.unused: dict[str, list[int]] = {}
+        self.missing: list[str] = []
+        self.raised: list[str] = []
+
+    def fail(self, tag: ET.Element | None, what: str) -> NoReturn:
+        """Raise an error that names the file and the line."""
+        where = f", line {line_of(tag)}" if tag is not None else ""
+        raise ModelError(f"{self.path}{where}: {what}")
+
+    def _parsed(self) -> ET.Element:
+        try:
+            data = self.path.read_bytes()
+        except OSError as error:
+            raise ModelError(f"{self.path} cannot be read: {error.strerror}") from None
+        builder, parser = ET.TreeBuilder(element_factory=_Element), expat.ParserCreate()
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            builder.start(tag, attributes).line = parser.CurrentLineNumber  # type: ignore[attr-defined]
+
+        parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+        try:
+            parser.Parse(data, True)
+        except expat.ExpatError as error:
+            raise ModelError(f"{self.path} is no XML: {error}") from None
+        root = builder.close()
+        if root.tag != "robot":
+            self.fail(root, f"<{root.tag}> is not URDF, whose first tag is <robot>")
+        return root
+
+    def _named(self, tag: str) -> dict[str, ET.Element]:
+        found: dict[str, ET.Element] = {}
+        for x in self.robot.findall(tag):
+            name = self.attribute(x, "name")
+            if name in found:
+                self.fail(x, f"there are two {tag}s {name!r}")
+            found[name] = x
+        return found
+
+    def attribute(self, tag: ET.Element, name: str) -> str:
+        """An attribute that must be there."""
+        if name not in tag.attrib:
+            self.fail(tag, f"<{tag.tag}> needs the attribute {name!r}")
+        return tag.attrib[name]
+
+    def numbers(self, tag: ET.Element | None, name: str, default: str | None, n: int = 3) -> np.ndarray:
+        """Numbers of an attribute; without a default it must be there."""
+        text = default
+        if tag is not None and (default is None or name in tag.attrib):
+            text = self.attribute(tag, name)
+        assert text is not None
+        try:
+            out = np.array([float(x) for x in text.split()])
+        except ValueError:
+            out = np.zeros(0)
+        if len(out) != n or not np.isfinite(out).all():
+            self.fail(tag, f"{name}={text!r} of <{getattr(tag, 'tag', '')}>: {n} finite numbers are needed")
+        return out
+
+    def number(self, tag: ET.Element | None, name: str, default: str | None = None) -> float:
+        """The number of an attribute."""
+        return float(self.numbers(tag, name, default, 1)[0])
+
+    def child(self, tag: ET.Element, name: str) -> ET.Element:
+        """A tag in another that must be there."""
+        found = tag.find(name)
+        if found is None:
+            self.fail(tag, f"<{tag.tag}> {tag.get('name', '')!r} needs <{name}>")
+        return found
+
+    def origin(self, tag: ET.Element) -> np.ndarray:
+        """Pose of an <origin>, (4, 4): roll, pitch and yaw are rotations about fixed axes x, y, z."""
+        place = tag.find("origin")
+        out = np.eye(4)
+        out[:3, 3] = self.numbers(place, "xyz", "0 0 0")
+        (r, p, y) = self.numbers(place, "rpy", "0 0 0")
+        cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
+        out[:3, :3] = [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+        return out
+
+    def _joint(self, tag: ET.Element) -> _Joint:
+        name, kind = self.attribute(tag, "name"), self.attribute(tag, "type")
+        if kind not in JOINT_TYPES:
+            self.fail(tag, f"joint {name!r} has the unknown type {kind!r}; URDF has {', '.join(JOINT_TYPES)}")
+        ends = [self.attribute(self.child(tag, role), "link") for role in ("parent", "child")]
+        for end in ends:
+            if end not in self.links:
+                self.fail(tag, f"joint {name!r} connects the link {end!r}, which does not exist")
+        axis = self.numbers(tag.find("axis"), "xyz", "1 0 0")
+        if kind not in ("fixed", "floating") and not axis.any():
+            self.fail(tag, f"the axis of joint {name!r} is zero")
+        return _Joint(name, kind, ends[0], ends[1], self.origin(tag), axis, tag)
+
+    def root(self) -> str:
+        """The link that is no child; refuse joints that form no tree."""
+        above: dict[str, _Joint] = {}
+        for j in self.joints:
+            if j.child in above:
+                self.fail(j.tag, f"link {j.child!r} is the child of two joints, {above[j.child].name!r} and {j.name!r}")
+            above[j.child] = j
+        roots = [name for name in self.links if name not in above]
+        if len(roots) > 1:
+            self.fail(self.links[roots[1]], f"the links {', '.join(map(repr, roots))} have no parent; one must be")
+        for j in self.joints:
+            met, link = set(), j.child
+            while link in above:
+                if link in met:
+                    self.fail(above[link].tag, f"the joints above link {link!r} form a circle")
+                met.add(link)
+                link = above[link].parent
+        if not roots:
+            self.fail(self.robot, "there is no link")
+        return roots[0]
+
+    def mechanism(self, make: Callable[..., T], floating: bool) -> T:
+        """The mechanism."""
+        root = self.root()
+        m = make(self.robot.get("name") or self.path.stem, gravity=(0, 0, -9.80665))
+        below: dict[str, list[_Joint]] = {name: [] for name in self.links}
+        for j in self.joints:
+            below[j.parent].append(j)
+        self.place: dict[str, np.ndarray] = {root: np.eye(4)}
+        self.carrier: dict[str, str] = {}
+        moving: list[Element] = []
+        self._add_link(m, root, None if floating else GROUND, below)
+        if not floating and self.carrier[root] != GROUND:
+            m.add(Fixed(self.name(f"{root}_on_ground"), GROUND, self.carrier[root], at=(0, 0, 0)))
+        waiting = below[root][::-1]
+        while waiting:
+            j = waiting.pop()
+            self.place[j.child] = self.place[j.parent] @ j.origin
+            self._add_link(m, j.child, self.carrier[j.parent] if j.kind == "fixed" else None, below)
+            if self.carrier[j.child] != self.carrier[j.parent] and j.kind != "floating":
+                m.add(*self._connection(j))
+                moving += self._limits_and_losses(j)
+            waiting += below[j.child][::-1]
+        m.add(*moving, *self._mimics())
+        self._report()
+        return m
+
+    def name(self, wanted: str) -> str:
+        """A name that flyball permits and that is not taken."""
+        plain = re.sub(r"\W", "_", wanted)
+        plain = plain if plain.isidentifier() else f"_{plain}"
+        taken = set(self.names.values())
+        while plain in taken or plain == GROUND:
+            plain += "_"
+        self.names[f"{wanted} {len(taken)}"] = plain
+        return plain
+
+    def _add_link(self, m: Model, link: str, rigid: str | None, below: dict[str, list[_Joint]]) -> None:
+        """Add a link as a body, or as a frame on ``rigid`` where it is rigidly connected and has no mass."""
+        tag, T = self.links[link], self.place[link]
+        inertial = tag.find("inertial")
+        shapes = tuple(self._shapes(tag))
+        name = self.name(link)
+        mass = 0.0 if inertial is None else self.number(self.child(inertial, "mass"), "value")
+        if mass < 0.0:
+            self.fail(inertial, f"the mass of link {link!r} is negative: {mass:g}")
+        pose: dict[str, Any] = {"position": tuple(T[:3, 3]), "orientation": rows(T[:3, :3])}
+        if rigid == GROUND and (mass == 0.0 or link == self.root()):
+            m.add(Frame(name, GROUND, **pose))
+            if shapes:
+                m.add(Ground(self.name(f"{link}_shape"), shape=shapes, **pose))
+            self.carrier[link] = GROUND
+            return
+        if mass == 0.0 and rigid is not None and not shapes:
+            carrier = next(x for x in self.place if self.carrier.get(x) == rigid)  # the first link of that body
+            back = np.linalg.inv(self.place[carrier]) @ T
+            place: dict[str, Any] = {"position": tuple(back[:3, 3]), "orientation": rows(back[:3, :3])}
+            m.add(Frame(name, rigid, **place))
+            self.carrier[link] = rigid
+            return
+        if mass == 0.0 and rigid is None and not self._carries_mass(link, below):
+            self.fail(tag, f"link {link!r} moves, and neither it nor a link beyond it has mass and inertia")
+        given: dict[str, Any] = {"mass": mass, "inertia": 0.0}
+        if inertial is not None and mass > 0.0:
+            J, own = self.child(inertial, "inertia"), self.origin(inertial)
+            xx, xy, xz, yy, yz, zz = (self.number(J, k) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+            tensor = self._physical(link, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+            given = {"mass": mass, "com": tuple(own[:3, 3]), "inertia": tensor, "inertia_axes": rows(own[:3, :3])}
+        try:
+            m.add(Body(name, **given, **pose, shape=shapes or None, color=self._color(tag)))
+        except ModelError as error:
+            self.fail(inertial if inertial is not None else tag, str(error))
+        self.carrier[link] = name
+
+    def _physical(self, link: str, tensor: np.ndarray) -> tuple[tuple[float, ...], ...]:
+        """Inertia of a link; if no body has it, its smaller principal moments are raised, with a warning."""
+        moments, axes = np.linalg.eigh(tensor)
+        lacks = moments[2] - moments[0] - moments[1]
+        if lacks <= ROUNDING * abs(moments[2]):
+            return rows(tensor)
+        self.raised.append(f"{link} by {0.5 * lacks:.3g} kg m^2")
+        return rows(axes @ np.diag(moments + [0.5 * lacks, 0.5 * lacks, 0.0]) @ axes.T)
+
+    def _carries_mass(self, link: str, below: dict[str, list[_Joint]]) -> bool:
+        """Whether a link beyond this one has mass."""
+        return any(
+            self.links[j.child].find("inertial/mass") is not None or self._carries_mass(j.child, below)
+            for j in below[link]
+        )
+
+    def _connection(self, j: _Joint) -> Iterator[Element]:
+        T = self.place[j.child]
+        ends = self.carrier[j.parent], self.carrier[j.child]
+        at, axis = tuple(T[:3, 3]), tuple(T[:3, :3] @ (j.axis / (np.linalg.norm(j.axis) or 1.0)))
+        name = self.name(j.name)
+        self.names[j.name] = name
+        if j.kind == "fixed":
+            yield Fixed(name, *ends, at=at)
+        elif j.kind == "planar":
+            yield Planar(name, *ends, at=at, axis=axis)
+        elif COORDINATES[j.kind] == "angle":
+            yield Revolute(name, *ends, at=at, axis=axis)
+        else:
+            yield Prismatic(name, *ends, at=at, axis=axis)
+
+    def _limits_and_losses(self, j: _Joint) -> Iterator[Element]:
+        """Stops, damping and friction of a joint, and an initial value if zero is not permitted."""
+        if j.kind not in COORDINATES:
+            return
+        name = self.names[j.name]
+        along = f"{name}.{COORDINATES[j.kind]}"
+        limit, losses = j.tag.find("limit"), j.tag.find("dynamics")
+        if j.kind != "continuous":
+            if limit is None:
+                self.fail(j.tag, f"joint {j.name!r} of type {j.kind} needs <limit>")
+            lower, upper = self.number(limit, "lower", "0"), self.number(limit, "upper", "0")
+            if lower > upper:
+                self.fail(limit, f"the limits of joint {j.name!r} are reversed: {lower:g} to {upper:g}")
+            if lower < upper:
+                yield Limit(self.name(f"{name}_limit"), along, lower=lower, upper=upper)
+            if not lower < 0.0 < upper:
+                yield Initial(along, value=0.5 * (lower + upper))
+        damping, friction = (self.number(losses, x, "0") for x in ("damping", "friction"))
+        for value, what in ((damping, "damping"), (friction, "friction")):
+            if value < 0.0:
+                self.fail(losses, f"the {what} of joint {j.name!r} is negative: {value:g}")
+        if damping:
+            yield CoordinateSpring(self.name(f"{name}_damping"), along, damping=damping)
+        if friction:
+            yield Brake(self.name(f"{name}_friction"), along, capacity=friction)
+
+    def _mimics(self) -> Iterator[Element]:
+        """Couplings of joints that follow others: value = multiplier * value of the other + offset."""
+        kinds = {j.name: j.kind for j in self.joints}
+        for j in self.joints:
+            tag = j.tag.find("mimic")
+            if tag is None:
+                continue
+            if j.kind == "fixed":
+                self.unused.setdefault("mimic of a fixed joint", []).append(line_of(tag))
+                continue
+            other = self.attribute(tag, "joint")
+            if kinds.get(other) not in COORDINATES or j.kind not in COORDINATES:
+                self.fail(tag, f"joint {j.name!r} cannot follow {other!r}: both must be joints with one coordinate")
+            factor, offset = self.number(tag, "multiplier", "1"), self.number(tag, "offset", "0")
+            ends = [f"{self.names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
+            yield Coupler(self.name(f"{self.names[j.name]}_mimic"), tuple(ends), weights=(1.0, -factor), value=offset)
+
+    def _shapes(self, link: ET.Element) -> list[Solid]:
+        """Visible shapes of a link, those for collision where there are no others that can be read."""
+        found = list(self._solids(link.findall("visual")))
+        return found or list(self._solids(link.findall("collision")))
+
+    def _solids(self, tags: list[ET.Element]) -> Iterator[Solid]:
+        for tag in tags:
+            T = self.origin(tag)
+            geometry = self.child(tag, "geometry")
+            given: dict[str, Any] = {"position": tuple(T[:3, 3]), "orientation": rows(T[:3, :3]), "looks": True}
+            for x in geometry:
+                if x.tag == "box":
+                    yield Box(edges=tuple(self.numbers(x, "size", None)), **given)
+                elif x.tag == "sphere":
+                    yield Sphere(radius=self.number(x, "radius"), **given)
+                elif x.tag == "cylinder":
+                    yield Cylinder(radius=self.number(x, "radius"), length=self.number(x, "length"), **given)
+                elif x.tag == "mesh" and (file := self._mesh_file(x)) is not None:
+                    scale = self.numbers(x, "scale", "1 1 1")
+                    if np.ptp(scale) != 0.0 or scale[0] <= 0.0:
+                        self.missing.append(f"{file.name} (scaled by {scale})")
+                    else:
+                        yield Mesh(path=str(file), scale=float(scale[0]), **given)
+
+    def _mesh_file(self, tag: ET.Element) -> Path | None:
+        """The file of a mesh: ``package://name/path`` is looked for in the folders above the model."""
+        text = self.attribute(tag, "filename")
+        inside = re.sub(r"^(package|model|file)://", "", text)
+        folders = [self.path.parent, *self.path.absolute().parents]
+        tries = [folder / part for folder in folders for part in (inside, inside.partition("/")[2])]
+        found = next((x for x in tries if x.is_file()), None)
+        if found is None or found.suffix.lower() not in MESH_FORMATS:
+            self.missing.append(f"{text} in line {line_of(tag)}")
+            return None
+        return found
+
+    def _color(self, link: ET.Element) -> str | None:
+        """Colour of the first visible shape, also by the name of a material of the robot."""
+        material = link.find("visual/material")
+        if material is None:
+            return None
+        color = material.find("color")
+        if color is None:
+            same = [x for x in self.robot.findall("material") if x.get("name") == material.get("name")]
+            color = same[0].find("color") if same else None
+        if color is None:
+            return None
+        rgba = np.clip(self.numbers(color, "rgba", None, 4), 0.0, 1.0)
+        return "#" + "".join(f"{round(255 * x):02x}" for x in rgba[:3])
+
+    def _report(self) -> None:
+        """Warn of everything that was not used."""
+        self._note_unused(self.robot)
+        parts = [f"<{what}> (line {shortened(lines)})" for what, lines in self.unused.items()]
+        if self.missing:
+            parts.append(f"meshes that are not found or not {', '.join(MESH_FORMATS)} ({shortened(self.missing)})")
+        if parts:
+            warn_user(f"{self.path.name}: not used: {'; '.join(parts)}", ModelWarning)
+        if self.raised:
+            warn_user(
+                f"{self.path.name}: no body has the inertia of {', '.join(self.raised)}: the largest principal moment "
+                f"is more than the sum of the others; the two smaller ones were raised by that",
+                ModelWarning,
+            )
+
+    def _note_unused(self, tag: ET.Element) -> None:
+        known = UNDERSTOOD.get(tag.tag, set())
+        for name in tag.attrib:
+            if name not in known and not name.startswith("xmlns"):
+                self.unused.setdefault(f"{tag.tag} {name}", []).append(line_of(tag))
+        for x in tag:
+            if x.tag not in known:
+                self.unused.setdefault(str(x.tag), []).append(line_of(x))
+            else:
+                self._note_unused(x)
+
+
+def line_of(tag: ET.Element) -> int:
+    """Line of the file in which a tag begins."""
+    return getattr(tag, "line", 0)
+
+
+def shortened(items: Sequence[Any]) -> str:
+    """The first few items of a list."""
+    return ", ".join(map(str, items[:MAX_LISTED])) + (", ..." if len(items) > MAX_LISTED else "")
+
+
+def rows(R: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """A matrix as tuples of its rows."""
+    return tuple(tuple(row) for row in R.tolist())

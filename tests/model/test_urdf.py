@@ -1,0 +1,160 @@
+"""Robots in URDF: what of the file becomes what of the mechanism, and what is said of the rest."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+ARM = """<?xml version="1.0"?>
+<robot name="arm">
+  <material name="blue"><color rgba="0 0 1 1"/></material>
+  <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry></visual></link>
+  <link name="upper-arm">
+    <inertial>
+      <origin xyz="0.3 0 0" rpy="0 0 1.5707963267948966"/>
+      <mass value="2"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.1"/>
+    </inertial>
+    <visual>
+      <origin xyz="0.3 0 0" rpy="0 1.5707963267948966 0"/>
+      <geometry><cylinder radius="0.04" length="0.6"/></geometry><material name="blue"/>
+    </visual>
+  </link>
+  <link name="slide"><inertial><mass value="0.5"/><inertia ixx=".01" ixy="0" ixz="0" iyy=".01" iyz="0" izz=".01"/></inertial></link>
+  <link name="tool"/>
+  <joint name="shoulder" type="revolute">
+    <origin xyz="0 0 0.4" rpy="0 0 0"/><parent link="base"/><child link="upper-arm"/><axis xyz="0 2 0"/>
+    <limit lower="-1" upper="2" effort="10" velocity="3"/><dynamics damping="0.7" friction="0.2"/>
+  </joint>
+  <joint name="rail" type="prismatic">
+    <origin xyz="0.6 0 0" rpy="0 0 0"/><parent link="upper-arm"/><child link="slide"/><axis xyz="1 0 0"/>
+    <limit lower="0.1" upper="0.3"/>
+  </joint>
+  <joint name="flange" type="fixed">
+    <origin xyz="0 0.1 0" rpy="0 0 1.5707963267948966"/><parent link="slide"/><child link="tool"/>
+  </joint>
+</robot>
+"""
+
+
+def read(tmp_path, text=ARM, **options):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        return fb.load(path, **options)
+
+
+def test_an_arm(tmp_path):
+    """Kinematics, inertia, stops, damping and friction, in closed form."""
+    m = read(tmp_path)
+    p = m.prepare(coordinates="joint")
+    assert p.names == ("shoulder.angle", "rail.displacement")
+    q, v, a = np.array([0.3, 0.2]), np.array([0.5, -0.4]), np.array([0.2, 0.7])
+    c, s = np.cos(q[0]), np.sin(q[0])
+    along = np.array([c, 0, -s])  # the arm turns about y
+    position, R = p.pose("tool", q)
+    np.testing.assert_allclose(position, [0, 0.1, 0.4] + (0.6 + q[1]) * along, atol=1e-14)
+    np.testing.assert_allclose(
+        R, np.array([along, [0, 1, 0], [s, 0, c]]).T @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-14
+    )
+    r, g = 0.6 + q[1], 9.80665  # the inertia about y of the arm is written as iyy of turned axes: ixx
+    M = np.diag([0.1 + 2 * 0.3**2 + 0.01 + 0.5 * r**2, 0.5])
+    np.testing.assert_allclose(p.crba(q), M, rtol=1e-13, atol=1e-15)
+    bias = [2 * 0.5 * r * v[0] * v[1] - g * c * (2 * 0.3 + 0.5 * r), -0.5 * r * v[0] ** 2 - 0.5 * g * s]
+    np.testing.assert_allclose(p.rnea(q, v, a), M @ a + bias, rtol=1e-12)
+    forces = p.forces(0.0, q, v) + bias  # of damping and friction
+    np.testing.assert_allclose(forces, [-0.7 * v[0] - 0.2, 0], atol=1e-12)
+    assert [(e.name, e.lower, e.upper) for e in m.limits] == [
+        ("shoulder_limit", -1.0, 2.0), ("rail_limit", 0.1, 0.3),
+    ]  # fmt: skip
+    assert p.q[1] == pytest.approx(0.2)  # zero is not permitted: the middle
+    assert m["upper_arm"].color == "#0000ff"
+    assert m.simulate(0.5)["shoulder.angle"].max() <= 2.0 + 1e-9
+
+
+def test_a_floating_robot(tmp_path):
+    m = read(tmp_path, floating=True, text=ARM.replace('<link name="base">', '<link name="base"><inertial><mass value="3"/>'
+             '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'))  # fmt: skip
+    p = m.prepare(coordinates="joint")
+    assert p.names[0] == "base.x" and len(p.v) == 8
+    np.testing.assert_allclose(p.aba(p.q, np.zeros(8), np.zeros(8))[:3], [0, 0, -9.80665], atol=1e-12)
+
+
+def test_a_joint_that_follows_another(tmp_path):
+    """mimic: value = multiplier * value of the other + offset."""
+    text = ARM.replace('<limit lower="0.1" upper="0.3"/>', '<limit lower="-1" upper="1"/>'
+                       '<mimic joint="shoulder" multiplier="0.1" offset="0.05"/>')  # fmt: skip
+    m = read(tmp_path, text)
+    run = m.simulate(0.3, outputs=11)
+    np.testing.assert_allclose(run["rail.displacement"], 0.1 * run["shoulder.angle"] + 0.05, atol=1e-9)
+
+
+def test_what_is_not_used_is_listed(tmp_path):
+    path = tmp_path / "arm.urdf"
+    text = ARM.replace("</robot>", "<transmission/><gazebo/></robot>").replace(
+        '<box size="0.2 0.2 0.1"/>', '<mesh filename="package://arm/base.stl"/>'
+    )
+    path.write_text(text)
+    with pytest.warns(
+        fb.ModelWarning, match=r"arm.urdf: not used: .*limit effort.*transmission.*gazebo.*base.stl in line 4"
+    ):
+        fb.load(path)
+
+
+def test_meshes_are_found_beside_the_package(tmp_path):
+    folder = tmp_path / "arm_description" / "meshes"
+    folder.mkdir(parents=True)
+    (folder / "base.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    text = ARM.replace(
+        '<box size="0.2 0.2 0.1"/>', '<mesh filename="package://arm_description/meshes/base.obj" scale="2 2 2"/>'
+    )
+    (tmp_path / "arm_description" / "arm.urdf").write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        m = fb.load(tmp_path / "arm_description" / "arm.urdf")
+    (mesh,) = m["base_shape"].shapes()
+    assert mesh.path.endswith("base.obj") and mesh.scale == 2.0
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (("<robot", "<sdf"), r"arm.urdf is no XML: mismatched tag: line 29"),
+        ((ARM, "<sdf/>"), r"arm.urdf, line 1: <sdf> is not URDF"),
+        (('child link="slide"', 'child link="sledge"'), r"line 22: joint 'rail' connects the link 'sledge', which does not exist"),
+        (('type="prismatic"', 'type="screw"'), "line 22: joint 'rail' has the unknown type 'screw'"),
+        (('parent link="base"', 'parent link="slide"'), "have no parent|form a circle"),
+        (('child link="tool"', 'child link="slide"'), "line 26: link 'slide' is the child of two joints, 'rail' and 'flange'"),
+        (('<mass value="2"/>', '<mass value="nan"/>'), "line 8: value='nan' of <mass>: 1 finite numbers are needed"),
+        (('<mass value="2"/>', ""), "line 6: <inertial> '' needs <mass>"),
+        (('<mass value="2"/>', '<mass value="-2"/>'), "line 6: the mass of link 'upper-arm' is negative"),
+        (('<axis xyz="1 0 0"/>', '<axis xyz="0 0 0"/>'), "the axis of joint 'rail' is zero"),
+        (('lower="0.1" upper="0.3"', 'lower="0.4" upper="0.3"'), "limits of joint 'rail' are reversed: 0.4 to 0.3"),
+        (('type="fixed"', 'type="continuous"'), "link 'tool' moves, and neither it nor a link beyond it has mass"),
+        (('name="tool"', 'name="slide"'), "there are two links 'slide'"),
+    ],
+)  # fmt: skip
+def test_errors_name_file_line_and_element(tmp_path, change, match):
+    text = ARM.replace(*change)
+    assert text != ARM
+    with pytest.raises(fb.ModelError, match=match):
+        read(tmp_path, text)
+
+
+def test_an_inertia_that_no_body_has_is_raised(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace('iyy="0.01" iyz="0" izz="0.1"', 'iyy="0.01" iyz="0" izz="0.2"'))
+    with pytest.warns(fb.ModelWarning, match=r"no body has the inertia of upper-arm by 0.045 kg m\^2"):
+        m = fb.load(path)
+    np.testing.assert_allclose(np.linalg.eigvalsh(np.array(m["upper_arm"].inertia)), [0.055, 0.145, 0.2])
+
+
+def test_floating_is_for_robots(tmp_path):
+    (tmp_path / "m.toml").write_text("[mechanism]\nname = 'x'\n")
+    with pytest.raises(fb.ModelError, match="floating=True is for robots"):
+        fb.load(tmp_path / "m.toml", floating=True)
