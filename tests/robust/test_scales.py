@@ -42,8 +42,17 @@ QUICK = ("assemble", "mobility", "kinematics", "linearize", "modes", "singularit
 
 @pytest.mark.parametrize("name", [*EXAMPLES, *RANDOM])
 def test_other_analyses_in_other_units_answer_the_same(name):
+    assert_the_same(name, (x for x in QUICK if (name, x) not in scales.UNDECIDED))
+
+
+@pytest.mark.parametrize("name", ["bricard.toml", "newtons_cradle.py", "thin_rod.toml", "lossless 0", "couplings 0"])
+def test_an_equilibrium_in_other_units_is_the_same(name):
+    assert_the_same(name, ("equilibrium", "sensitivity equilibrium", "inverse_dynamics"))
+
+
+def assert_the_same(name, analyses):
     m = CASES[name]()[0]
-    for analysis in (x for x in QUICK if (name, x) not in scales.UNDECIDED):
+    for analysis in analyses:
         allowed = scales.ROUNDING if analysis in scales.ROUNDED else 0.0
         own, *others = (
             scales.scaled_answers.asked(analysis, scales.scaled(m, s), s)
