@@ -50,6 +50,10 @@ def test_an_equilibrium_in_other_units_is_the_same(name):
     assert_the_same(name, ("equilibrium", "sensitivity equilibrium", "inverse_dynamics"))
 
 
+def test_a_pair_of_real_eigenvalues_has_the_same_order_in_other_units():
+    assert_the_same("heavy_top.toml", ("sensitivity modes",))
+
+
 def assert_the_same(name, analyses):
     m = CASES[name]()[0]
     for analysis in analyses:
