@@ -7,6 +7,7 @@ examples and 200 random mechanisms in six scales; `scales.EXEMPT` lists what may
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
@@ -15,6 +16,8 @@ import scales
 from fuzzing import content, scenes
 
 import flyball as fb
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from flyball.derivatives.force_balance import residual_rounding
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
@@ -52,6 +55,16 @@ def test_an_equilibrium_in_other_units_is_the_same(name):
 
 def test_a_pair_of_real_eigenvalues_has_the_same_order_in_other_units():
     assert_the_same("heavy_top.toml", ("sensitivity modes",))
+
+
+@pytest.mark.parametrize("name", ["slider_crank.toml", "quick_return.toml", "car_axis.toml", "toggle_press.toml"])
+def test_the_rounding_of_forces_does_not_depend_on_which_numbers_are_integers(name):
+    energies = []
+    for s in (SMALL_SLOW, LARGE_FAST):
+        a = scales.scaled(CASES[name]()[0], s).assemble()
+        rounding = residual_rounding(EquationDerivatives(MechanismState.resting(a.compiled, a.t, a.q)))
+        energies.append(rounding[: len(a.v)] * a.compiled.sizes / s.of("J"))
+    assert np.array_equal(*energies) and energies[0].any()
 
 
 def assert_the_same(name, analyses):
