@@ -33,11 +33,17 @@ def curves(run: fb.Result | fb.InverseDynamics, s: Scale) -> Answers:
 
 
 def numbers(run: fb.Result | fb.InverseDynamics, s: Scale) -> Answers:
-    """All numbers of a result by unit: what is zero but for rounding is compared with the others."""
+    """All numbers of a result by unit: what is zero but for rounding is compared with the others.
+
+    Torques are divided by the mechanism's length and compared with the forces.
+    """
     found, out = curves(run, s), {}
+    result = run if isinstance(run, fb.Result) else run.result
+    length = result.values.length / s.length
     for name, (unit, _) in run.channels().items():
         if name in found:
-            out.setdefault(unit, []).append(found[name])
+            torque = unit == "N*m"
+            out.setdefault("N" if torque else unit, []).append(found[name] / length if torque else found[name])
     return {unit: np.stack(x, axis=-1) for unit, x in out.items()}
 
 

@@ -119,6 +119,21 @@ def test_a_door_leans_on_its_stop() -> None:
     assert e.stability == "stable"
 
 
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+def test_stops_of_forces_and_of_torques_are_compared_in_any_unit_of_length(length: float) -> None:
+    """A block of 1 kg on its stop, and beside it a bar of 0.1 g that leans on its own: both carry a load."""
+    m = fb.Mechanism("beside", planar=True, gravity=(0, -G * length))
+    m.add(fb.Body("block", mass=1, inertia=0.1 * length**2, position=(-length, 0)))
+    m.add(fb.Body("bar", mass=1e-4, inertia=1e-5 * length**2, position=(0.5 * length, 0)))
+    m.add(fb.Translational("rail", "ground", "block", at=(-length, 0), axis=(0, 1)))
+    m.add(fb.Revolute("pin", "ground", "bar", at=(0, 0)))
+    m.add(fb.Limit("buffer", "rail.displacement", lower=0), fb.Limit("stop", "pin.angle", lower=0))
+    found = {k.name: k for k in m.equilibrium().touching}
+    assert found["buffer"].normal == pytest.approx(G * length)
+    assert found["stop"].normal == pytest.approx(1e-4 * G * 0.5 * length**2)
+    assert {k.state for k in found.values()} == {"smooth"}
+
+
 def test_a_wedge_locks_itself() -> None:
     """A wedge of 20 degrees between two plates, of which one presses: it stays where mu > tan(10 deg)."""
     half = math.radians(10)

@@ -153,6 +153,8 @@ def test_sensitivities_at_a_kink_are_refused():
         slider("max(0, p) - 9*value", p=0.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
     with pytest.raises(fb.SingularityError, match=r"has a kink at push.value = 0 m"):
         slider("p - 9*value - abs(value)", p=0.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
+    found = slider("max(0, 1e9*p - 0.5) - 9*value", p=1e-9).sensitivity(["block.x"], ["p"], analysis="equilibrium")
+    assert found["block.x", "p"] == pytest.approx(1e9 / 9)  # twice as large as at its kink
     found = slider("p - 9*value - abs(value)", p=1.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
     assert found["block.x", "p"] == pytest.approx(1 / 10)
 

@@ -343,11 +343,21 @@ def test_states_of_a_universal_joint_are_its_angles():
     np.testing.assert_allclose(model.C, np.eye(2, 4), atol=1e-12)
 
 
-@pytest.mark.parametrize("time", [1e-9, 1.0, 1e10])
-def test_what_is_still_is_told_by_the_mechanisms_own_pace(time):
+@pytest.mark.parametrize("time", [1e-5, 1e5])
+def test_what_changes_with_time_is_refused_in_any_unit_of_time(time):
+    m = fb.Mechanism("rod", planar=True)
+    m.add(fb.Body("rod", mass=1.0, inertia=1.0), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Motor("motor", joint="A", torque=f"-(5 + 4*cos(3*t/{time!r}))*angle/{time!r}**2"))
+    with pytest.raises(fb.AnalysisError, match="depend on time"):
+        m.modes()
+
+
+@pytest.mark.parametrize(("time", "length"), [(1e-9, 1.0), (1.0, 1.0), (1e10, 1.0), (1.0, 1e-10), (1.0, 1e10)])
+def test_what_is_still_is_told_by_the_mechanisms_own_pace(time, length):
     """A pendulum swings through its lowest place at a hundredth of its pace, or at a part of 1e-12 of that."""
-    m = fb.Mechanism("slow", planar=True, gravity=(0, -G / time**2), parameters={"rate": 0.0})
-    m.add(fb.Body("bob", mass=1.0, inertia=0.1, position=(0, -1)), fb.Revolute("A", "ground", "bob", at=(0, 0)))
+    m = fb.Mechanism("slow", planar=True, gravity=(0, -G * length / time**2), parameters={"rate": 0.0})
+    m.add(fb.Body("bob", mass=1.0, inertia=0.1 * length**2, position=(0, -length)))
+    m.add(fb.Revolute("A", "ground", "bob", at=(0, 0)))
     m.add(fb.Initial("A.angle", rate="rate"))
     with pytest.raises(fb.AnalysisError, match="is not steady"):
         m.linearize(parameters={"rate": 0.01 / time})

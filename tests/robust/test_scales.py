@@ -7,6 +7,7 @@ examples and 200 random mechanisms in six scales; `scales.EXEMPT` lists what may
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
@@ -15,6 +16,8 @@ import scales
 from fuzzing import content, scenes
 
 import flyball as fb
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from flyball.derivatives.force_balance import residual_rounding
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
@@ -42,8 +45,31 @@ QUICK = ("assemble", "mobility", "kinematics", "linearize", "modes", "singularit
 
 @pytest.mark.parametrize("name", [*EXAMPLES, *RANDOM])
 def test_other_analyses_in_other_units_answer_the_same(name):
+    assert_the_same(name, (x for x in QUICK if (name, x) not in scales.UNDECIDED))
+
+
+@pytest.mark.parametrize("name", ["bricard.toml", "newtons_cradle.py", "thin_rod.toml", "lossless 0", "couplings 0"])
+def test_an_equilibrium_in_other_units_is_the_same(name):
+    assert_the_same(name, ("equilibrium", "sensitivity equilibrium", "inverse_dynamics"))
+
+
+def test_a_pair_of_real_eigenvalues_has_the_same_order_in_other_units():
+    assert_the_same("heavy_top.toml", ("sensitivity modes",))
+
+
+@pytest.mark.parametrize("name", ["slider_crank.toml", "quick_return.toml", "car_axis.toml", "toggle_press.toml"])
+def test_the_rounding_of_forces_does_not_depend_on_which_numbers_are_integers(name):
+    energies = []
+    for s in (SMALL_SLOW, LARGE_FAST):
+        a = scales.scaled(CASES[name]()[0], s).assemble()
+        rounding = residual_rounding(EquationDerivatives(MechanismState.resting(a.compiled, a.t, a.q)))
+        energies.append(rounding[: len(a.v)] * a.compiled.sizes / s.of("J"))
+    assert np.array_equal(*energies) and energies[0].any()
+
+
+def assert_the_same(name, analyses):
     m = CASES[name]()[0]
-    for analysis in (x for x in QUICK if (name, x) not in scales.UNDECIDED):
+    for analysis in analyses:
         allowed = scales.ROUNDING if analysis in scales.ROUNDED else 0.0
         own, *others = (
             scales.scaled_answers.asked(analysis, scales.scaled(m, s), s)

@@ -29,7 +29,7 @@ from ..tables.values import Values, values
 
 COMPLEX_STEP = 1e-40
 SELF_STRESS_LIMIT = 1e-8  # singular values of unit rows below this part of the largest count as zero
-# Columns of F below this part of the largest entry of G are rounding.
+# Columns of F below this part of the largest entry of the row of G are rounding.
 COUPLING_LIMIT = 1e-9
 
 
@@ -85,7 +85,8 @@ def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.nd
         x.c.at(x.t, x.q, x.v)
         G = x.c.jacobian()
         out[:, rows] += G[rows].T
-        out[:, np.abs(out).max(axis=0) <= COUPLING_LIMIT * np.abs(G).max(initial=0.0)] = 0.0
+        size = x.c.sizes[:, None]
+        out[:, (size * np.abs(out)).max(axis=0) <= COUPLING_LIMIT * (size * np.abs(G.T)).max(axis=0)] = 0.0
     return out
 
 
@@ -93,13 +94,14 @@ def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
     """Whether joint friction makes dr/dlam differ from -G^T; arguments as in `friction_by_multipliers`."""
     s = x.c.structure
     nv, nr = s.nv, len(s.rows)
-    random = np.random.default_rng(0).uniform(1.0, 2.0, nr)
+    x.c.at(x.t, x.q, x.v)
+    G = x.c.sparse_jacobian()
+    size = np.sqrt(G.multiply(G) @ x.c.sizes**2)
+    random = np.random.default_rng(0).uniform(1.0, 2.0, nr) / np.where(size > 0.0, size, 1.0)
     steps = np.zeros((1, 3 * nv + 1), complex)
     found = np.zeros((1, nv + 3 * nr + 3 * len(s.measured)), complex)
     y, vdot, lam = x.y.astype(complex), x.vdot.astype(complex), x.lam + 1j * COMPLEX_STEP * random
     evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, found)
-    x.c.at(x.t, x.q, x.v)
-    G = x.c.sparse_jacobian()
     left = complex_step_derivative(found[0, :nv]) + G.T @ random
     return bool((np.abs(left) > COUPLING_LIMIT * (abs(G).T @ random)).any())
 
@@ -113,6 +115,7 @@ def refuse_undetermined_friction(s: Structure, G: np.ndarray, F: np.ndarray) -> 
     G : ndarray (rows, nv)
         Constraint rows; rotations are scaled to lengths.
     F : ndarray (nv, rows)
+        Derivatives of the forces by the multipliers; torques are scaled likewise.
 
     Raises
     ------
@@ -120,11 +123,8 @@ def refuse_undetermined_friction(s: Structure, G: np.ndarray, F: np.ndarray) -> 
         With the names of the friction elements.
     """
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    free = fundamental_subspaces(G / size[:, None], SELF_STRESS_LIMIT).dependencies / size[:, None]
-    if (
-        not free.size
-        or not np.abs(F @ free).max(initial=0.0) > SELF_STRESS_LIMIT * np.abs(F).max() * np.abs(free).max()
-    ):
+    free = fundamental_subspaces(G / size[:, None], SELF_STRESS_LIMIT).dependencies
+    if not free.size or not np.abs(F / size @ free).max(initial=0.0) > SELF_STRESS_LIMIT * np.abs(F / size).max():
         return
     names = [
         e.name

@@ -21,6 +21,7 @@ from .equation_derivatives import EquationDerivatives, MechanismState
 
 PERTURBED_SAMPLES = 4
 PERTURBATION = 4.0 * np.finfo(float).eps  # relative perturbation of positions and multipliers
+EXACT_BITS = 24  # numbers with at most so many significant bits are taken as exact
 ROUNDING_MARGIN = 8.0  # differences below so many times the spread of the samples are rounding
 
 
@@ -125,11 +126,17 @@ def perturbed_states(x: MechanismState, states: np.ndarray) -> Iterator[Mechanis
         q = x.q.copy()
         retract(S, q, size * digits(size=len(size)))
         v, vdot, lam, effort = (a * (1.0 + digits(size=len(a))) for a in (x.v, x.vdot, x.lam, x.effort))
-        rounded = with_numbers(S, lambda _, a: np.where(a == np.rint(a), a, a * (1.0 + digits(size=a.shape))))  # noqa: B023
+        rounded = with_numbers(S, lambda _, a: np.where(_is_exact(a), a, a * (1.0 + digits(size=a.shape))))  # noqa: B023
         z = x.z.copy()
         z[: len(states)] += states * digits(size=len(states))
         c = replace(x.c, values=replace(x.c.values, system=rounded))
         yield replace(x, c=c, q=q, v=v, z=z, vdot=vdot, lam=lam, effort=effort)
+
+
+def _is_exact(a: np.ndarray) -> np.ndarray:
+    """Which numbers have few significant bits, such as 0, 3 and 0.75: results of roundings have not."""
+    leading = np.ldexp(np.frexp(a)[0], EXACT_BITS)
+    return leading == np.rint(leading)
 
 
 class StateSizes(NamedTuple):

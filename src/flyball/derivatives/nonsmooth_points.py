@@ -131,6 +131,8 @@ def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[Non
         for k, name in enumerate(names):
             if name in states:
                 sizes[k] = state_sizes(e).change[states.index(name)]
+            elif name in to:
+                sizes[k] = abs(at[k]) or 1.0
         of = [*zip(names, at, values, sizes.tolist(), strict=True)]
         out += [_nonsmooth_point(e, element, text, of, *k, to) for k in nonsmooth_directions(law, at, sizes)]
     return out

@@ -529,7 +529,8 @@ def _multiplier_free_directions(e: EquationDerivatives, f: FreeCoordinates) -> n
     """
     F = np.zeros(f.rows.T.shape)
     F[:, : e.block("n").size] = e.by_reactions
-    refuse_undetermined_friction(e.state.c.structure, (f.rows * f.scale)[: e.block("n").size], e.by_reactions)
+    scaled = f.scale[:, None] * e.by_reactions
+    refuse_undetermined_friction(e.state.c.structure, (f.rows * f.scale)[: e.block("n").size], scaled)
     R = f.scale[:, None] * (F - f.rows.T)
     C = column_space((f.rows * f.scale).T)
     Z = f.Zv / f.scale[:, None]

@@ -128,11 +128,12 @@ def _joint_turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
         own = np.vstack([v, np.einsum("jin,jn->in", R.reshape(3, 3, nv), w)])
         H = _body_turning_matrix(R[:, 0].real.reshape(3, 3), w.real @ x.v, turning)
         size = np.r_[np.full(3, c.values.length), np.ones(3)][:, None]
-        J.append(own.real / size)
-        rate.append(complex_step_derivative(own) / size)
-        turned.append(H @ own.real / size)
+        J.append(own.real / size * c.sizes)
+        rate.append(complex_step_derivative(own) / size * c.sizes)
+        turned.append(H @ own.real / size * c.sizes)
     H = np.linalg.lstsq(np.vstack(J), np.vstack(turned) - np.vstack(rate), rcond=None)[0]
-    return np.where(np.abs(H) > MATRIX_ROUNDING * np.abs(H).max(initial=0.0), H, 0.0)
+    H = np.where(np.abs(H) > MATRIX_ROUNDING * np.abs(H).max(initial=0.0), H, 0.0)
+    return c.sizes[:, None] * H / c.sizes
 
 
 def _cross_product_matrix(w: np.ndarray) -> np.ndarray:
@@ -183,9 +184,9 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
 
 def is_still(x: MechanismState) -> bool:
     """Whether all speeds are negligible compared with the mechanism's characteristic rate or its accelerations."""
-    scale, pace = x.c.sizes / x.c.values.length, float(x.c.work.options.rate)
-    given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
-    return not (np.abs(x.v) / scale).max(initial=0.0) > REST_SPEED * given
+    pace = float(x.c.work.options.rate)
+    given = np.sqrt(pace**2 + np.abs(x.vdot / x.c.sizes).max(initial=0.0))
+    return not (np.abs(x.v) / x.c.sizes).max(initial=0.0) > REST_SPEED * given
 
 
 def continuous_rates(e: EquationDerivatives) -> np.ndarray:
@@ -280,15 +281,17 @@ def has_time_laws(S: System) -> bool:
 
 def _refuse_time_dependence(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame) -> None:
     """Refuse linear equations that change with time although the mechanism rests."""
-    now = reduced_equations(e, f, frame).A
-    fastest = float(np.sqrt(np.abs(now).max(initial=0.0))) or 1.0
+    now = reduced_equations(e, f, frame)
+    rates = now.A * now.uncertainty.unit / now.uncertainty.unit[:, None]  # in natural units of the states [1/s]
+    fastest = float(np.abs(rates).max(initial=0.0)) or float(x.c.work.options.rate) or 1.0
     z = x.c.z.copy()
     then = reduced_equations(
         EquationDerivatives(MechanismState.moving(x.c, x.t + COMPARISON_ANGLE / fastest, x.q, x.v)), f, frame
-    ).A
+    )
     x.c.at(x.t, x.q, x.v)
     x.c.z = z
-    if np.abs(then - now).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(now).max(initial=0.0):
+    changed = (then.A - now.A) * now.uncertainty.unit / now.uncertainty.unit[:, None]
+    if np.abs(changed).max(initial=0.0) > COEFFICIENT_TOLERANCE * fastest:
         raise time_dependence_error()
 
 

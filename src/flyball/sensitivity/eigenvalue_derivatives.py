@@ -126,7 +126,7 @@ def eigenvalue_derivatives(
     Returns
     -------
     w : ndarray (n,)
-        Eigenvalues sorted by magnitude, then imaginary part.
+        Eigenvalues sorted by magnitude, then imaginary part, then real part.
     dw : ndarray (n, k)
 
     Raises
@@ -141,7 +141,7 @@ def eigenvalue_derivatives(
     B, (scale, _) = matrix_balance(A, permute=False, separate=True)
     dB = dA / scale[:, None] * scale
     w, left, right = eig(B, left=True)
-    order = np.lexsort((w.imag, np.abs(w)))
+    order = _in_order(w)
     w, left, right = w[order], left[:, order], right[:, order]
     size = float(np.linalg.norm(B, 2)) or 1.0
     out = np.zeros((len(w), len(dA)), complex)
@@ -155,6 +155,14 @@ def eigenvalue_derivatives(
         else:
             out[group] = _group_derivatives(B, dB, w, group, size, scale, aside)
     return w.astype(complex), out
+
+
+def _in_order(w: np.ndarray) -> np.ndarray:
+    """Indices that sort eigenvalues by magnitude, equal but for rounding or not, imaginary part, and real part."""
+    size = np.abs(w)
+    order, distinct = np.argsort(size), np.zeros(len(w), int)
+    distinct[order] = np.cumsum(np.diff(size[order], prepend=0.0) > EQUAL_TOLERANCE * size[order])
+    return np.lexsort((w.real, w.imag, distinct))
 
 
 def _group_derivatives(

@@ -172,7 +172,7 @@ def parameter_scale(model: Model, parameters: Mapping[str, float], name: str) ->
 
 # A parameter is refused if more than this part of the gaps that it opens remains after the best motion.
 REMAINING_GAP = 1e-7
-# Gaps below this, relative to the mechanism's length, for a full change of the parameter count as zero.
+# Gaps below this, relative to the mechanism's length or a radian, for a full change of the parameter count as zero.
 GAP_ROUNDING = 1e-9
 
 
@@ -226,7 +226,8 @@ class ConstrainedSystem:
         self.G = c.jacobian()
         self.M = c.mass().toarray() if M is None else M
         self.which = np.array([r.holonomic for r in c.structure.rows], bool)
-        self.scale = np.array([1.0 / np.sqrt(m) if m > 0.0 else 1.0 for m in np.diag(self.M)])
+        inertia = np.diag(self.M) * c.sizes**2
+        self.scale = c.sizes / np.sqrt(np.where(inertia > 0.0, inertia, inertia.max(initial=0.0) or 1.0))
         n, m = len(self.M), len(self.G)
         self.A = np.zeros((n + m, n + m))
         S = self.scale
@@ -266,8 +267,8 @@ def reaction_friction(x: MechanismState, G: np.ndarray) -> np.ndarray:
     """Derivatives F (nv, rows) of joint friction by the reactions; refused where these are undetermined."""
     s = x.c.structure
     F = friction_by_multipliers(x, *complex_tables(x.c))
-    turns = np.array([1.0 if d.unit == "m" else 1.0 / x.c.values.length for d in velocity_names(s)])
-    refuse_undetermined_friction(s, G * turns, F)
+    scale = x.c.sizes / x.c.values.length
+    refuse_undetermined_friction(s, G * scale, scale[:, None] * F)
     return F
 
 
@@ -292,7 +293,8 @@ def consistent_changes(
 def _refuse_inconsistent(d: ParameterDirection, x: MechanismState, before: np.ndarray, remaining: np.ndarray) -> None:
     """Refuse a parameter whose change opens gaps (rows,) that no motion closes."""
     c = x.c
-    rounding = GAP_ROUNDING * c.values.length / parameter_scale(c.structure.model, c.parameters, d.name)
+    before, remaining = before / c.row_units, remaining / c.row_units
+    rounding = GAP_ROUNDING / parameter_scale(c.structure.model, c.parameters, d.name)
     if remaining.max(initial=0.0) > max(REMAINING_GAP * before.max(initial=0.0), rounding):
         names = dict.fromkeys(
             r.element.name for r, g in zip(c.structure.rows, remaining, strict=True) if g > 0.1 * remaining.max()

@@ -385,6 +385,8 @@ def touch_states(
         for name, sign in held.signs.items()
         if name not in bears
     }
+    lever = {name: 1.0 / x.row_scale[x.c.structure.slices[name]].max() for name in stops}  # efforts times it: energies
+    heaviest = max((lever[name] * abs(effort) for name, effort in stops.items()), default=0.0)
     most = max([*found.force[:, 0].tolist(), 0.0])
     for c, f in zip(place.contacts, found.force, strict=True):
         slides = float(np.hypot(f[1], f[2]))
@@ -397,7 +399,7 @@ def touch_states(
         used = abs(lam[name]) / bound if bound > 0.0 else 0.0
         out.append(Touch(name, AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS, bound, abs(lam[name]), used))
     for name, effort in stops.items():
-        opens = held.signs[name] and effort <= NOTHING * max(map(abs, stops.values()))
+        opens = held.signs[name] and lever[name] * effort <= NOTHING * heaviest
         out.append(Touch(name, ABOUT_TO_OPEN if opens else FRICTIONLESS, effort))
     return tuple(out)
 

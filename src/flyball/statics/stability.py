@@ -44,6 +44,8 @@ from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE
 from ..results.modes import largest_growth
 from ..tables.structure_definition import velocity_names
 
+CLOSED_GAP = 1e-12  # gap of rows of unit norm [rad, or relative to the mechanism's length] that counts as closed
+VANISHING_STIFFNESS = 1e-14  # stiffness along a velocity below this part of the largest energy is rounding
 STATE_RANGE = 100.0  # natural size of a step of a controller state, in large changes: steps are limited in length
 
 
@@ -175,7 +177,7 @@ class RestState:
 
     def open(self) -> float:
         """Largest gap, relative to the mechanism's length or in radians."""
-        return float(np.abs(self.equations.block("g")).max(initial=0.0)) / self.c.values.length
+        return float(np.abs(self.equations.block("g") / self.c.row_units).max(initial=0.0))
 
     def balancing_multipliers(self) -> np.ndarray:
         """Multipliers with the smallest residual forces."""
@@ -213,8 +215,7 @@ class RestState:
             return self._solve_dense(r, g, damping)
         K = (self.K + damping * self.size * sp.identity(n)).tocsr()
         stiff = np.asarray(abs(K).max(axis=1).todense()).ravel() if n else np.zeros(0)
-        weakest = 1e-14 * stiff.max(initial=0.0)
-        own = 1.0 / np.sqrt(np.where(stiff > weakest, stiff, stiff.max(initial=1e-300) or 1.0))
+        own = self._row_factors(stiff)
         D = sp.diags(own)
         if not len(g):
             return own * minimum_norm_solution(D @ K @ D, -own * r), np.zeros(0)
@@ -225,13 +226,16 @@ class RestState:
         x = minimum_norm_solution(sp.bmat([[D @ K @ D, -G.T], [G, None]]), np.r_[-own * r, -rows * g])
         return own * x[:n], rows * x[n:] * self.row_scale
 
+    def _row_factors(self, stiff: np.ndarray) -> np.ndarray:
+        """Factors 1 / sqrt(stiffness), so that all unknowns have one unit; `size` stands for vanishing stiffness."""
+        return 1.0 / np.sqrt(np.where(stiff > VANISHING_STIFFNESS * self.size, stiff, self.size))
+
     def _solve_dense(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
         """Like `_solve` with dense matrices, which are faster for a small mechanism."""
         n = len(self.scale)
         K = self.K.toarray() + damping * self.size * np.eye(n)
         stiff = np.abs(K).max(axis=1, initial=0.0)
-        most = float(stiff.max(initial=0.0))
-        own = 1.0 / np.sqrt(np.where(stiff > 1e-14 * most, stiff, most or 1.0))
+        own = self._row_factors(stiff)
         K = own[:, None] * K * own
         if not len(g):
             return own * minimum_norm_solution(K, -own * r), np.zeros(0)
@@ -252,7 +256,7 @@ class RestState:
         """State projected onto the constraints, with the multipliers that balance best."""
         now = self
         for _ in range(8):
-            if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
+            if not len(now.g) or np.abs(now.g).max() < CLOSED_GAP:
                 break
             now = now.moved(minimum_norm_solution(now.G, -now.g), 0.0 * now.lam)
         return now.balanced()
