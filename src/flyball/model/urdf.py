@@ -320,7 +320,7 @@ class _Reader:
         if lacks <= ROUNDING * abs(moments[2]):
             return rows(tensor)
         self.raised.append(f"{link} by {0.5 * lacks:.3g} kg m^2")
-        return rows(axes @ np.diag(moments + [0.5 * lacks, 0.5 * lacks, 0.0]) @ axes.T)
+        return rows(axes @ np.diag(moments + 0.5 * lacks * np.array([1.0, 1.0, 0.0])) @ axes.T)
 
     def _carries_mass(self, link: str, below: dict[str, list[_Joint]]) -> bool:
         """Whether a link beyond this one has mass."""
