@@ -83,7 +83,7 @@ def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
 
         return load_python(given, Mechanism)
     if given.suffix.lower() == ".urdf":
-        from .model.urdf import load_urdf
+        from .robots.urdf import load_urdf
 
         return load_urdf(given, Mechanism, floating)
     from .model.toml_file import load

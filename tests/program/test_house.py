@@ -40,7 +40,7 @@ LAYERS = (  # from the foundation up: a package imports, when it is imported, on
     "joints forces controllers elements laws analysis_options progress",
     "tables",
     "engine",
-    "results expression_graph",
+    "results expression_graph robots",
     "assembly codegen",
     "mobility",
     "derivatives",

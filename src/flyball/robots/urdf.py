@@ -27,14 +27,14 @@ from ..joints.fixed import Fixed
 from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
-from .body import GROUND, Body, Frame, Ground, Initial
-from .element import Element
-from .model import Model
-from .shapes.box import Box
-from .shapes.cylinder import Cylinder
-from .shapes.mesh import MESH_FORMATS, Mesh
-from .shapes.solid import Solid
-from .shapes.sphere import Sphere
+from ..model.body import GROUND, Body, Frame, Ground, Initial
+from ..model.element import Element
+from ..model.model import Model
+from ..model.shapes.box import Box
+from ..model.shapes.cylinder import Cylinder
+from ..model.shapes.mesh import MESH_FORMATS, Mesh
+from ..model.shapes.solid import Solid
+from ..model.shapes.sphere import Sphere
 
 T = TypeVar("T", bound=Model)
 
