@@ -149,7 +149,11 @@ def _sensitivity(analysis: str) -> Callable[[fb.Mechanism, Scale], Answers]:
         what = [] if analysis == "modes" else what[:1] if analysis == "equilibrium" else what
         x = m.sensitivity(what, analysis=analysis)
         size = np.array([s.of(unit) for unit in x.units])
-        return {"values": x.values / size, "derivatives": x.derivatives[..., 0] / size}
+        out = {"values": x.values / size, "derivatives": x.derivatives[..., 0] / size}
+        if analysis == "equilibrium":  # one place, which may be zero but for rounding
+            length = m.assemble().compiled.values.length / s.length
+            out = {k: np.append(values, length) for k, values in out.items()}
+        return out
 
     return of
 
