@@ -29,6 +29,7 @@ from ..results.recorded_kinematics import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
+from .inverse_kinematics import InverseKinematics, inverse_kinematics
 from .recursive_methods import RecursiveMethods
 
 
@@ -163,6 +164,51 @@ class Prepared(RecursiveMethods):
         q, d = self._state(q, d)
         retract(self._start.compiled.values.system, q, d)
         return q
+
+    def inverse_kinematics(
+        self,
+        frame: str,
+        position: Any = None,
+        rotation: Any = None,
+        *,
+        near: np.ndarray | None = None,
+        starts: int = 100,
+        seed: int = 0,
+    ) -> InverseKinematics:
+        """Find the configurations at which a frame has a given position and orientation.
+
+        By damped least squares from many starts at once: ``near``, and random configurations between the stops. An arm
+        of six joints has up to 16 solutions; with more joints there is a continuum, of which some are found.
+
+        Parameters
+        ----------
+        frame : str
+            A body (its reference frame) or a frame.
+        position : point [m], optional
+            Of the frame's origin, in the world. Not given: anywhere.
+        rotation : orientation, optional
+            Of the frame in the world: a quaternion (scalar first), Bryant angles [rad], or a matrix with the axes as
+            columns; in the plane an angle [rad]. Not given: any.
+        near : array_like, (nq,), optional
+            The solution nearest to it comes first, and the search begins there. Not given: the initial state.
+        starts : int
+            Number of configurations to begin from.
+        seed : int
+            Of the random ones.
+
+        Returns
+        -------
+        InverseKinematics
+            Its ``q`` has a row for each configuration.
+
+        Raises
+        ------
+        NotConverged
+            If none is found; the message says how near the frame came.
+        AnalysisError
+            If joints close loops.
+        """
+        return inverse_kinematics(self, frame, position, rotation, near, starts, seed)
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}

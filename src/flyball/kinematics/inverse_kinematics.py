@@ -1,0 +1,249 @@
+"""Inverse kinematics of a frame: coordinates at which it has a given position and orientation.
+
+Damped least squares (Levenberg and Marquardt) from many starts at once. Positions are divided by the mechanism's
+length, orientations are rotation vectors. Coordinates with stops (`Limit`) stay between these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import AnalysisError, ModelError, NotConverged
+from ..forces.limit import Limit
+from ..model.geometry import orientation_matrix, rotation_about, vector
+from ..rotations.arrays import quaternion_of
+from ..tables.element_numbers import element_numbers
+
+if TYPE_CHECKING:
+    from .prepared import Prepared
+
+Array = np.ndarray
+MAX_ITERATIONS = 100
+MIN_DAMPING, MAX_DAMPING = 1e-12, 1e8
+"""Range of the damping, relative to the largest diagonal entry of J^T J."""
+ROUNDING = 1e-13
+"""Error, in lengths of the mechanism or radians, that rounding explains: iterations end there."""
+ACCEPTED = 1e-9
+"""Error up to which a start counts as converged: near singular positions convergence is slow."""
+DISTINCT = 1e-5
+"""Difference of coordinates, in radians or lengths of the mechanism, from which on two solutions are two."""
+SINGULAR = 1e-6
+"""Smallest singular value of the Jacobian, relative to the largest, below which a position is singular."""
+
+
+@dataclass(frozen=True)
+class InverseKinematics:
+    """Configurations at which a frame has a given pose, the nearest to the one wanted first.
+
+    Attributes
+    ----------
+    frame : str
+    q : ndarray, (m, nq)
+        The configurations.
+    errors : ndarray, (m, 2)
+        Remaining errors of position [m] and orientation [rad].
+    singular : ndarray of bool, (m,)
+        Whether some motion of the frame is impossible there that is possible nearby: the Jacobian loses rank.
+    freedoms : int
+        Motions of the mechanism that leave the frame where it is (of the first configuration). If there are some, the
+        solutions form a continuum, and ``q`` has some of them.
+    """
+
+    frame: str
+    q: Array
+    errors: Array
+    singular: Array
+    freedoms: int
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Return labelled lines of text."""
+        number = f"{len(self)} configuration{'s' * (len(self) != 1)}"
+        more = f", of a continuum of {self.freedoms} freedoms" if self.freedoms else ""
+        out = [("inverse kinematics", f"{self.frame}: {number}{more}")]
+        for k, q in enumerate(self.q):
+            note = "  (singular)" if self.singular[k] else ""
+            out.append((f"  {k}", " ".join(f"{x:.6g}" for x in q) + note))
+        return out
+
+    def __repr__(self) -> str:
+        """Return the lines as text."""
+        return "\n".join(f"{label:<19} {text}" for label, text in self.lines())
+
+
+class _Target(NamedTuple):
+    """What the frame must reach; the rows of its Jacobian that count, and their units."""
+
+    frame: str
+    position: Array
+    rotation: Array
+    rows: Array
+    scale: Array
+
+
+class _Starts(NamedTuple):
+    """Configurations to begin from, and the range of each coordinate."""
+
+    q: Array
+    lower: Array
+    upper: Array
+
+
+def inverse_kinematics(
+    p: Prepared, frame: str, position: Any, rotation: Any, near: Any, starts: int, seed: int
+) -> InverseKinematics:
+    """See `Prepared.inverse_kinematics`."""
+    if p.rows:
+        closing = ", ".join(dict.fromkeys(row.partition(":")[0] for row in p.rows))
+        raise AnalysisError(
+            f"inverse_kinematics is for mechanisms whose joints form a tree; in these coordinates {p.model.name!r} has "
+            f"constraint equations of {closing}. Prescribe the frame by Drivers and use m.kinematics"
+        )
+    if not isinstance(starts, int) or starts < 1:
+        raise ModelError(f"starts is {starts!r}; it must be a number of configurations to begin from, 1 or more")
+    target = _target(p, frame, position, rotation)
+    begin = _starts(p, near, starts, seed)
+    q, error = _iterate(p, target, begin)
+    good = np.linalg.norm(error, axis=1) <= ACCEPTED
+    if not good.any():
+        best = int(np.argmin(np.linalg.norm(error, axis=1)))
+        shift, turn = _errors(p, target, q[best : best + 1])[0]
+        raise NotConverged(
+            f"no configuration of {p.model.name!r} was found at which {frame!r} has this pose, from {starts} starts; "
+            f"the nearest found misses it by {shift:.4g} m and {np.degrees(turn):.4g} deg. It may be out of reach or "
+            f"beyond stops; more starts= search farther"
+        )
+    return _distinct(p, target, q[good], begin)
+
+
+def _target(p: Prepared, frame: str, position: Any, rotation: Any) -> _Target:
+    planar = p.model.planar
+    if position is None and rotation is None:
+        raise ModelError("inverse_kinematics needs a position, a rotation, or both")
+    where, R, rows = np.zeros(3), np.eye(3), list[int]()
+    if position is not None:
+        where = np.array(vector(position, planar, "position"), float)
+        rows += [0, 1] if planar else [0, 1, 2]
+    if rotation is not None:
+        R = rotation_about(2, float(rotation)) if planar else orientation_matrix(rotation, "rotation")
+        rows += [5] if planar else [3, 4, 5]
+    if not (np.isfinite(where).all() and np.isfinite(R).all()):
+        raise ModelError("position and rotation must be finite")
+    length = float(p._start.compiled.values.system.scales.length.real)
+    scale = np.array([1.0 / length] * 3 + [1.0] * 3)
+    return _Target(frame, where, R, np.array(rows), scale[rows])
+
+
+def _ranges(p: Prepared) -> tuple[Array, Array]:
+    """Range of each velocity's coordinate, from stops along it."""
+    lower, upper = np.full(len(p.v), -np.inf), np.full(len(p.v), np.inf)
+    numbers = element_numbers(p.model, p.parameters_given)
+    for e in p.model.limits:
+        if isinstance(e, Limit) and e.coordinate in p.names:
+            n, d = numbers[e.name], p.names.index(e.coordinate)
+            lower[d] = max(lower[d], -np.inf if n.lower is None else float(n.lower))
+            upper[d] = min(upper[d], np.inf if n.upper is None else float(n.upper))
+    return lower, upper
+
+
+def _starts(p: Prepared, near: Any, starts: int, seed: int) -> _Starts:
+    """The wanted configuration, and random ones: angles anywhere, lengths about it as far as the mechanism's length."""
+    first = p.q if near is None else p._states((near,))[0][0][0]
+    lower, upper = _ranges(p)
+    sizes = p._start.compiled.sizes
+    angles = _is_rotation(p)
+    low = np.where(np.isfinite(lower), lower, np.where(angles, -np.pi, -sizes))
+    high = np.where(np.isfinite(upper), upper, np.where(angles, np.pi, sizes))
+    shifts = np.random.default_rng(seed).uniform(low, np.maximum(low, high), (starts - 1, len(low)))
+    plain = len(p.q) == len(p.v)
+    others = shifts if plain else np.array([p.step(first, d) for d in shifts]).reshape(-1, len(p.q))
+    return _Starts(np.concatenate([first[None], others]), lower, upper)
+
+
+def _is_rotation(p: Prepared) -> Array:
+    """Whether each velocity turns a body."""
+    J = np.array([np.linalg.norm(p.frame_jacobian(b.name, p.q)[3:], axis=0) for b in p.model.bodies])
+    return J.max(axis=0, initial=0.0) > 0.0
+
+
+def _pose_error(p: Prepared, t: _Target, q: Array) -> Array:
+    """Errors of pose in the rows of the target, scaled, (k, rows)."""
+    x, R = p.pose(t.frame, q)
+    e = quaternion_of(t.rotation @ np.swapaxes(R, 1, 2))
+    s = np.linalg.norm(e[:, 1:], axis=1)
+    turn = e[:, 1:] * np.where(s > 0.0, 2.0 * np.arctan2(s, e[:, 0]) / np.where(s > 0.0, s, 1.0), 2.0)[:, None]
+    return np.concatenate([t.position - x, turn], axis=1)[:, t.rows] * t.scale
+
+
+def _errors(p: Prepared, t: _Target, q: Array) -> Array:
+    """Errors of position [m] and orientation [rad], (k, 2)."""
+    e = _pose_error(p, t, q) / t.scale
+    return np.array([np.linalg.norm(e[:, part], axis=1) for part in (t.rows < 3, t.rows >= 3)]).T
+
+
+def _jacobian(p: Prepared, t: _Target, q: Array) -> Array:
+    return p.frame_jacobian(t.frame, q)[:, t.rows] * t.scale[:, None]
+
+
+def _moved(p: Prepared, begin: _Starts, q: Array, d: Array) -> Array:
+    """Configurations moved along the velocities, as far as stops permit."""
+    if q.shape[1] != d.shape[1]:
+        return np.array([p.step(a, b) for a, b in zip(q, d, strict=True)])
+    return np.clip(q + d, begin.lower, begin.upper)
+
+
+def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
+    """Minimise the errors from all starts; returns configurations and errors."""
+    q = _moved(p, begin, begin.q, np.zeros((len(begin.q), len(p.v))))
+    error = _pose_error(p, t, q)
+    damping = np.full(len(q), 1e-3)
+    for _ in range(MAX_ITERATIONS):
+        active = np.flatnonzero((np.linalg.norm(error, axis=1) > ROUNDING) & (damping < MAX_DAMPING))
+        if not len(active):
+            break
+        J = _jacobian(p, t, q[active])
+        A, b = np.swapaxes(J, 1, 2) @ J, np.einsum("kij,ki->kj", J, error[active])
+        if q.shape[1] == b.shape[1]:  # a coordinate at a stop that would go beyond it stays
+            held = ((q[active] <= begin.lower) & (b < 0.0)) | ((q[active] >= begin.upper) & (b > 0.0))
+            b = np.where(held, 0.0, b)
+            A = np.where(held[:, :, None] | held[:, None, :], 0.0, A)
+        largest = np.maximum(np.einsum("kii->ki", A).max(axis=1), np.finfo(float).tiny)
+        A = A + (damping[active] * largest)[:, None, None] * np.eye(A.shape[1])
+        step = np.linalg.solve(A, b[..., None])[..., 0]
+        tried = _moved(p, begin, q[active], step)
+        found = _pose_error(p, t, tried)
+        better = np.linalg.norm(found, axis=1) < np.linalg.norm(error[active], axis=1)
+        at = active[better]
+        q[at], error[at] = tried[better], found[better]
+        damping[at] = np.maximum(0.1 * damping[at], MIN_DAMPING)
+        damping[active[~better]] *= 10.0
+    return q, error
+
+
+def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinematics:
+    """Different solutions, the nearest to the first start first; unlimited angles within half a turn of it."""
+    first = begin.q[0]
+    turn, units = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
+    if q.shape[1] == len(p.v):
+        turn[_is_rotation(p) & ~np.isfinite(begin.lower) & ~np.isfinite(begin.upper)] = 2.0 * np.pi
+        units = p._start.compiled.sizes
+
+    def difference(a: Array, b: Array) -> Array:
+        return a - b - np.where(np.isfinite(turn), turn * np.round((a - b) / turn), 0.0)
+
+    q = first + difference(q, first)
+    order = np.argsort(np.abs((q - first) / units).max(axis=1), kind="stable")
+    found: list[int] = []
+    for k in order.tolist():
+        if all(np.abs(difference(q[k], q[i]) / units).max() > DISTINCT for i in found):
+            found.append(k)
+    q = q[found]
+    values = np.linalg.svd(_jacobian(p, t, q), compute_uv=False)
+    rank = (values > SINGULAR * values[:, :1]).sum(axis=1)
+    full = min(len(t.rows), len(p.v))
+    return InverseKinematics(t.frame, q, _errors(p, t, q), rank < full, len(p.v) - int(rank[0]))

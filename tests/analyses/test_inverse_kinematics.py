@@ -1,0 +1,104 @@
+"""Inverse kinematics of frames: closed forms, all solutions of an arm of six joints, stops, singular positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import flyball as fb
+
+UR5 = ((0, 0.089159, np.pi / 2), (-0.425, 0, 0), (-0.39225, 0, 0), (0, 0.10915, np.pi / 2), (0, 0.09465, -np.pi / 2),
+       (0, 0.0823, 0))  # fmt: skip
+"""a [m], d [m], alpha [rad] of the joints, as the manufacturer gives them (Denavit and Hartenberg)."""
+
+
+def denavit_hartenberg(q):
+    """Poses of all links, (7, 4, 4)."""
+    out = [np.eye(4)]
+    for (a, d, alpha), x in zip(UR5, q, strict=True):
+        c, s, ca, sa = np.cos(x), np.sin(x), np.cos(alpha), np.sin(alpha)
+        step = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+        out.append(out[-1] @ np.array(step))
+    return np.array(out)
+
+
+@pytest.fixture(scope="module")
+def ur5():
+    m = fb.Mechanism("UR5", gravity=(0, 0, -9.81))
+    T = denavit_hartenberg(np.zeros(6))
+    for k in range(1, 7):
+        R = tuple(map(tuple, T[k, :3, :3]))
+        m.add(fb.Body(f"link{k}", mass=1, inertia=(0.1, 0.1, 0.1), position=tuple(T[k, :3, 3]), orientation=R))
+        before = f"link{k - 1}" if k > 1 else "ground"
+        m.add(fb.Revolute(f"J{k}", before, f"link{k}", at=tuple(T[k - 1, :3, 3]), axis=tuple(T[k - 1, :3, 2])))
+    return m
+
+
+def test_all_eight_solutions(ur5):
+    """Of a generic pose; each is checked by the product of the manufacturer's transformations."""
+    p = ur5.prepare(coordinates="joint")
+    for seed in range(1, 6):
+        q = np.random.default_rng(seed).uniform(-1.2, 1.2, 6) + (0, 0, 1.4, 0, 1.3, 0)
+        T = denavit_hartenberg(q)[-1]
+        found = p.inverse_kinematics("link6", T[:3, 3], T[:3, :3], near=q)
+        assert len(found) == 8 and found.freedoms == 0 and not found.singular.any()
+        np.testing.assert_allclose(found.q[0], q, atol=1e-8)
+        for x in found.q:
+            np.testing.assert_allclose(denavit_hartenberg(x)[-1], T, atol=1e-9)
+        assert (abs(found.q - q) <= np.pi + 1e-9).all()
+
+
+def test_two_links():
+    """Elbow up and down, by the law of cosines; at the end of the reach both are one, and singular."""
+    a, b = 0.5, 0.3
+    m = fb.Mechanism("arm", planar=True)
+    m.add(fb.Body("A", mass=1, inertia=0.1, position=(a / 2, 0)), fb.Body("B", mass=1, inertia=0.1, position=(a, 0)))
+    m.add(fb.Frame("tip", "B", position=(b, 0)))
+    m.add(fb.Revolute("J", "ground", "A", at=(0, 0)), fb.Revolute("K", "A", "B", at=(a, 0)))
+    p = m.prepare(coordinates="joint")
+    x, y = 0.4, 0.35
+    elbow = np.arccos((x**2 + y**2 - a**2 - b**2) / (2 * a * b))
+    found = p.inverse_kinematics("tip", (x, y))
+    wanted = sorted((np.arctan2(y, x) - np.arctan2(b * np.sin(e), a + b * np.cos(e)), e) for e in (elbow, -elbow))
+    np.testing.assert_allclose(sorted(map(tuple, found.q)), wanted, atol=1e-9)
+    assert "2 configurations" in repr(found)
+    end = p.inverse_kinematics("tip", ((a + b) * np.cos(0.3), (a + b) * np.sin(0.3)))
+    np.testing.assert_allclose(end.q[0], (0.3, 0.0), atol=1e-4)  # the error is of second order there
+    assert end.singular.all()
+    with pytest.raises(fb.NotConverged, match=r"'tip' has this pose, from 100 starts.*misses it by 0.1 m"):
+        p.inverse_kinematics("tip", (a + b + 0.1, 0))
+    angle = p.inverse_kinematics("B", rotation=1.0)
+    assert angle.freedoms == 1
+    np.testing.assert_allclose(np.cos(angle.q.sum(axis=1) - 1.0), 1.0, atol=1e-12)
+    limited = m.changed({})
+    limited.add(fb.Limit("stop", "K.angle", lower=0.0, upper=3.0))
+    (only,) = limited.prepare(coordinates="joint").inverse_kinematics("tip", (x, y)).q
+    assert only[1] == pytest.approx(elbow)
+
+
+def test_a_free_body():
+    m = fb.Mechanism("free")
+    m.add(fb.Body("b", mass=1, inertia=(1, 2, 3), position=(1, 0, 0)))
+    p = m.prepare(coordinates="joint")
+    found = p.inverse_kinematics("b", (0.3, -0.2, 0.1), (0.1, 0.2, 0.3), starts=3)
+    x, R = p.pose("b", found.q[0])
+    np.testing.assert_allclose(x, (0.3, -0.2, 0.1), atol=1e-12)
+    np.testing.assert_allclose(R, Rotation.from_euler("XYZ", (0.1, 0.2, 0.3)).as_matrix(), atol=1e-12)
+
+
+def test_bad_input(ur5):
+    p = ur5.prepare(coordinates="joint")
+    for given, match in (
+        ({}, "a position, a rotation, or both"),
+        ({"position": (1, 0)}, "expected 3 components"),
+        ({"position": (np.nan, 0, 0)}, "finite"),
+        ({"position": (0, 0, 0), "starts": 0}, "starts is 0"),
+        ({"position": (0, 0, 0), "near": np.zeros(5)}, "q has the shape"),
+    ):
+        with pytest.raises(fb.ModelError, match=match):
+            p.inverse_kinematics("link6", **given)
+    closed = ur5.changed({})
+    closed.add(fb.PointOnLine("guide", "ground", "link6", at=(-0.8, 0, 0), axis=(1, 0, 0)))
+    with pytest.raises(fb.AnalysisError, match="constraint equations of guide"):
+        closed.prepare(coordinates="joint").inverse_kinematics("link6", (0, 0, 0))
