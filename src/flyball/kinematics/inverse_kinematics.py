@@ -142,7 +142,7 @@ def _target(p: Prepared, frame: str, position: Any, rotation: Any) -> _Target:
 def _ranges(p: Prepared) -> tuple[Array, Array]:
     """Range of each velocity's coordinate, from stops along it."""
     lower, upper = np.full(len(p.v), -np.inf), np.full(len(p.v), np.inf)
-    numbers = element_numbers(p.model, p.parameters_given)
+    numbers = element_numbers(p.model, p.parameters_given).of
     for e in p.model.limits:
         if isinstance(e, Limit) and e.coordinate in p.names:
             n, d = numbers[e.name], p.names.index(e.coordinate)
