@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -33,9 +33,11 @@ from ..engine.recursive_dynamics import tree_dynamics, velocity_paths
 from ..errors import AnalysisError, ModelError
 from ..model.body import GROUND, Frame
 from ..tables.table_definitions import FREE, SPHERICAL, System
+from .closed_loops import dependent_velocities, drive_forces, forward_dynamics
 
 if TYPE_CHECKING:
     from ..assembly.assembled_state import Assembly
+    from .prepared import Prepared
 
 Array = np.ndarray
 _NO_COLUMNS = np.zeros((1, 0, 0))
@@ -254,9 +256,10 @@ class RecursiveMethods:
     Generalised forces and velocities are in the order of `Prepared.names`, in SI units.
 
     These methods see bodies, tree joints and gravity. Springs, drivers, contacts and other forces are not part of them:
-    `forces` and `acceleration` include these. Neither are joints that close loops: inverse dynamics and the mass matrix
-    are those of the tree (loops add G^T lam), forward dynamics is refused. Non-finite numbers, wrong shapes and
-    quaternions of length zero raise `ModelError`; other quaternions are normalised.
+    `forces` and `acceleration` include these. Of mechanisms with closed loops, the mass matrix and the inverse dynamics
+    are those of the tree of joints (loops add G^T lam), unless drives are named; `aba` and `reduced_mass_matrix`
+    include the loops. Non-finite numbers, wrong shapes and quaternions of length zero raise `ModelError`; other
+    quaternions are normalised.
     """
 
     _start: Assembly
@@ -267,7 +270,16 @@ class RecursiveMethods:
     model: Any
     specialized: bool
 
-    def rnea(self, q: Array, v: Array, a: Array, *, out: Array | None = None, threads: int = 1) -> Array:
+    def rnea(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        *,
+        drives: Sequence[str] | None = None,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
         """Inverse dynamics: the generalised forces that give accelerations (recursive Newton-Euler algorithm).
 
         tau = M(q) a + c(q, v) - g(q). Featherstone (2008), table 5.1.
@@ -276,6 +288,9 @@ class RecursiveMethods:
         ----------
         q, v, a : array_like, (nq,), (nv,), (nv,), or k rows of these
             Coordinates, velocities, accelerations [SI].
+        drives : list of str, optional
+            Names of the velocities along which forces act. With closed loops, the accelerations must satisfy the
+            constraints (`dependent_velocities`), and there must be as many drives as freedoms.
         out : ndarray, optional
             Array for the result.
         threads : int
@@ -284,7 +299,16 @@ class RecursiveMethods:
         Returns
         -------
         ndarray, (nv,) or (k, nv) [N, N m]
+            With drives their forces, (drives,) or (k, drives).
+
+        Raises
+        ------
+        AnalysisError
+            If the drives cannot give these accelerations, or their forces are not determined.
         """
+        if drives is not None:
+            forces = self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), None, threads)[0]
+            return self._for_states(lambda x, y, f: drive_forces(cast("Prepared", self), f, x, y, drives), q, v, forces)
         return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
 
     def bias_forces(self, q: Array, v: Array, *, out: Array | None = None, threads: int = 1) -> Array:
@@ -341,10 +365,62 @@ class RecursiveMethods:
         Raises
         ------
         AnalysisError
-            If joints close loops, or a velocity moves no inertia.
+            If a velocity moves no inertia; with closed loops also if a state violates the constraints.
         """
-        self._require_tree("aba")
+        if self.rows:
+            found = self._for_states(lambda x, y, f: forward_dynamics(cast("Prepared", self), x, y, f)[0], q, v, tau)
+            if out is None:
+                return found
+            _result_arrays([found.shape], out)[0][:] = found
+            return out
         return self._batch(FORWARD_DYNAMICS, (q, v, tau), ((len(self.v),),), out, threads)[0]
+
+    def loop_multipliers(self, q: Array, v: Array, tau: Array) -> Array:
+        """Multipliers lam of the constraint rows at the accelerations of `aba`: loops load the tree with G^T lam.
+
+        Returns
+        -------
+        ndarray, (nr,) or (k, nr)
+            In the order of `Prepared.rows`. With dependent rows those of least norm.
+        """
+        return self._for_states(lambda x, y, f: forward_dynamics(cast("Prepared", self), x, y, f)[1], q, v, tau)
+
+    def dependent_velocities(self, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
+        """All velocities and accelerations of a mechanism with closed loops, by independent ones w.
+
+        Parameters
+        ----------
+        q, v : array_like, (nq,), (nv,), or k rows of these
+            A state that satisfies the constraints.
+        independent : list of str
+            Names of as many velocities as there are freedoms.
+
+        Returns
+        -------
+        B : ndarray, (nv, f) or (k, nv, f)
+            v = B w.
+        c : ndarray, (nv,) or (k, nv) [m/s^2, rad/s^2]
+            vdot = B wdot + c.
+
+        Raises
+        ------
+        AnalysisError
+            If these velocities are not independent, or do not determine the others.
+        """
+        B, c = self._for_states(
+            lambda x, y, _: dependent_velocities(cast("Prepared", self), x, y, independent), q, v, v, several=True
+        )
+        return B, c
+
+    def reduced_mass_matrix(self, q: Array, independent: Sequence[str]) -> Array:
+        """Mass matrix of a mechanism with closed loops for independent velocities: B^T M B.
+
+        Returns
+        -------
+        ndarray, (f, f) or (k, f, f) [kg, kg m, kg m^2]
+        """
+        B, _ = self.dependent_velocities(q, np.zeros(len(self.v)), independent)
+        return np.asarray(np.swapaxes(B, -1, -2) @ self.mass_matrix(q) @ B)
 
     def rnea_derivatives(
         self, q: Array, v: Array, a: Array, *, out: Sequence[Array] | None = None, threads: int = 1
@@ -493,6 +569,14 @@ class RecursiveMethods:
                 x.evaluate(task, given, flat, _NO_FRAME, 1)
 
         return call
+
+    def _for_states(self, evaluate: Callable[..., Any], *given: Array, several: bool = False) -> Any:
+        """Result of a function of rows (k, n), for one state or many."""
+        states, k = self._states(given)
+        found = evaluate(*[np.broadcast_to(x, (len(states[0]), x.shape[1])) for x in states])
+        if k is None:
+            return tuple(x[0] for x in found) if several else found[0]
+        return found
 
     def _momenta(self, q: Array, v: Array, threads: int) -> Array:
         return self._batch(MOMENTUM, (q, v), ((11,),), None, threads)[0]

@@ -1,0 +1,114 @@
+"""Recursive dynamics with closed loops: against the engine, closed forms, and forwards against backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+
+def four_bar():
+    m = fb.Mechanism("four-bar", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("crank", mass=0.4, inertia=0.0015, position=(0, 0.1)))
+    m.add(fb.Body("coupler", mass=1.2, inertia=0.034, position=(0.25, 0.35)))
+    m.add(fb.Body("rocker", mass=1.0, inertia=0.022, position=(0.55, 0.25)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "coupler", at=(0, 0.2)))
+    m.add(fb.Revolute("C", "coupler", "rocker", at=(0.5, 0.5)), fb.Revolute("D", "ground", "rocker", at=(0.6, 0)))
+    return m
+
+
+def spatial_four_bar():
+    """The same in space: three of its rows depend on the others."""
+    m = fb.Mechanism("redundant", gravity=(0, -9.81, 0))
+    for e in four_bar().bodies:
+        m.add(fb.Body(e.name, mass=e.mass, inertia=(e.inertia,) * 3, position=(*e.position, 0)))
+    for e in four_bar().joints:
+        m.add(fb.Revolute(e.name, e.body_i, e.body_j, at=(*e.at, 0), axis=(0, 0, 1)))
+    return m
+
+
+@pytest.fixture(scope="module", params=[four_bar, spatial_four_bar])
+def case(request):
+    """A prepared mechanism and consistent states: those of a motion."""
+    m = request.param()
+    p = m.prepare(coordinates="joint")
+    run = p.simulate(1.0, outputs=8, rtol=1e-10)
+    return p, run.q, run.v
+
+
+def test_forward_dynamics_is_the_engines(case):
+    p, q, v = case
+    a = p.aba(q, v, np.zeros(len(p.v)))
+    np.testing.assert_allclose(a, [p.acceleration(0.0, *x) for x in zip(q, v, strict=True)], rtol=1e-8, atol=1e-8)
+    np.testing.assert_array_equal(p.aba(q[3], v[3], np.zeros(len(p.v))), p.aba(q[3:4], v[3:4], np.zeros(len(p.v)))[0])
+    tau = np.zeros(len(p.v))
+    tau[p.names.index("A.angle")] = 2.5
+    m = p.model.changed({})
+    m.add(fb.Motor("motor", "A", torque="2.5"))
+    driven = m.prepare(coordinates="joint")
+    wanted = [driven.acceleration(0.0, *x) for x in zip(q, v, strict=True)]
+    np.testing.assert_allclose(p.aba(q, v, tau), wanted, rtol=1e-8, atol=1e-8)
+
+
+def test_the_equations_are_satisfied(case):
+    """M a = tau - bias + G^T lam with the engine's Jacobian."""
+    p, q, v = case
+    tau = np.linspace(-1, 1, len(p.v))
+    a, lam = p.aba(q[2], v[2], tau), p.loop_multipliers(q[2], v[2], tau)
+    G = p.jacobian(0.0, q[2])
+    left = p.mass_matrix(q[2]) @ a + p.bias_forces(q[2], v[2]) - tau
+    np.testing.assert_allclose(G.T @ lam, left, atol=1e-9)
+
+
+def test_backwards(case):
+    """The torque of the crank that gives an acceleration, and the acceleration that this torque gives."""
+    p, q, v = case
+    B, c = p.dependent_velocities(q, v, ["A.angle"])
+    np.testing.assert_allclose((B @ v[:, [p.names.index("A.angle")], None])[..., 0], v, atol=1e-7)
+    a = 3.0 * B[..., 0] + c
+    torque = p.rnea(q, v, a, drives=["A.angle"])
+    tau = np.zeros((len(q), len(p.v)))
+    tau[:, p.names.index("A.angle")] = torque[:, 0]
+    np.testing.assert_allclose(p.aba(q, v, tau), a, rtol=1e-9, atol=1e-9)
+    reduced = p.reduced_mass_matrix(q, ["A.angle"])  # the change of the torque per acceleration
+    more = p.rnea(q, v, a + B[..., 0], drives=["A.angle"])
+    np.testing.assert_allclose(reduced[:, 0, 0], (more - torque)[:, 0], rtol=1e-7)
+    w = 1.7  # twice the kinetic energy
+    energy = p.energies(q, w * B[..., 0])[:, 0]
+    np.testing.assert_allclose(reduced[:, 0, 0] * w**2, 2 * energy, rtol=1e-9)
+
+
+def test_gears_count_turns():
+    """A coupling of angles far beyond a whole turn, in closed form."""
+    m = fb.Mechanism("gears", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=0.2), fb.Body("b", mass=1, inertia=0.3, position=(1, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "ground", "b", at=(1, 0)))
+    m.add(fb.Coupler("gear", ["A.angle", "B.angle"], weights=[1, 2]))
+    p = m.prepare(coordinates="joint")
+    q = np.array([[20.0, -10.0], [-90.0, 45.0]])
+    np.testing.assert_allclose(p.aba(q, [0.0, 0.0], [1.0, 0.0])[:, 0], 1 / (0.2 + 0.3 / 4), rtol=1e-12)
+
+
+def test_bad_input():
+    p = four_bar().prepare(coordinates="joint")
+    zero = np.zeros(len(p.v))
+    with pytest.raises(fb.AnalysisError, match=r"state 0 violates the constraints of 'four-bar': 'C: .*' is off by"):
+        p.aba(p.q + 0.3, zero, zero)
+    with pytest.raises(fb.AnalysisError, match="A.angle, B.angle are not independent"):
+        p.dependent_velocities(p.q, zero, ["A.angle", "B.angle"])
+    with pytest.raises(fb.ModelError, match="'E.angle' is no velocity"):
+        p.rnea(p.q, zero, zero, drives=["E.angle"])
+    with pytest.raises(fb.ModelError, match="give a list of names"):
+        p.reduced_mass_matrix(p.q, "A.angle")
+    five = fb.Mechanism("two", planar=True)
+    five.add(fb.Body("a", mass=1, inertia=1), fb.Body("b", mass=1, inertia=1, position=(1, 0)))
+    five.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "ground", "b", at=(1, 0)))
+    t = five.prepare(coordinates="joint")
+    with pytest.raises(fb.AnalysisError, match="cannot give these accelerations"):
+        t.rnea([0.0, 0.0], [0.0, 0.0], [1.0, 1.0], drives=["A.angle"])
+    m = four_bar()
+    m.add(fb.Driver("motor", "A.angle", "t"))
+    with pytest.raises(fb.AnalysisError, match="has drivers or curves"):
+        d = m.prepare(coordinates="joint")
+        d.aba(d.q, d.v, np.zeros(len(d.v)))
