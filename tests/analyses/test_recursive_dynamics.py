@@ -215,14 +215,16 @@ define void @both(ptr %x, ptr %s, ptr %c) {{
 
 
 def test_planar_and_absolute_coordinates():
-    """The recursion also holds where every body is free; the loop is not part of it."""
+    """The recursion also holds where every body is free; the joint's rows are solved with it."""
     m = fb.Mechanism("bar", planar=True, gravity=(0, -G))
     m.add(fb.Body("A", mass=2, inertia=0.3, position=(0.5, 0)), fb.Revolute("J", "ground", "A", at=(0, 0)))
     p = m.prepare(coordinates="absolute")
     np.testing.assert_allclose(p.crba(p.q), np.diag([2, 2, 0.3]))
     np.testing.assert_allclose(p.gravity_forces(p.q), (0, 2 * G, 0))
-    with pytest.raises(fb.AnalysisError, match=r"aba .* constraint equations of J"):
-        p.aba(p.q, p.v, p.v)
+    alpha = -2 * G * 0.5 / (0.3 + 2 * 0.25)
+    np.testing.assert_allclose(p.aba(p.q, p.v, np.zeros(3)), (0, 0.5 * alpha, alpha), atol=1e-12)
+    with pytest.raises(fb.AnalysisError, match=r"aba_derivatives .* constraint equations of J"):
+        p.aba_derivatives(p.q, p.v, p.v)
 
 
 def test_stops_count_as_open():
