@@ -31,10 +31,18 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
     """
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write the description to a TOML file; `flyball.load` reads it back exactly."""
+        """Write the description to a TOML file; `flyball.load` reads it back exactly.
+
+        A path that ends in ``.urdf`` gets URDF, if joints form a tree: revolute, prismatic, fixed and planar joints
+        with their stops, damping and friction. What that format does not have is listed in a `ModelWarning`.
+        """
+        if str(path).lower().endswith(".urdf"):
+            from .robots.urdf_writer import save_urdf
+
+            return save_urdf(self, Path(path))
         from .model.toml_file import save
 
-        save(self, path)
+        return save(self, path)
 
     def _repr_html_(self) -> str:
         from .view.still_picture import mechanism_html

@@ -158,3 +158,53 @@ def test_floating_is_for_robots(tmp_path):
     (tmp_path / "m.toml").write_text("[mechanism]\nname = 'x'\n")
     with pytest.raises(fb.ModelError, match="floating=True is for robots"):
         fb.load(tmp_path / "m.toml", floating=True)
+
+
+def test_written_and_read_again(tmp_path):
+    """The dynamics of the mechanism that is read are those of the one that was written."""
+    m = fb.Mechanism("arm", gravity=(0, 0, -9.80665))
+    box = fb.Box(edges=(0.1, 0.2, 0.3), position=(0.1, 0, 0), orientation=(0.1, 0.2, 0.3), looks=True)
+    m.add(fb.Body("a", mass=2, inertia=((0.3, 0.01, 0), (0.01, 0.4, 0.02), (0, 0.02, 0.5)), com=(0.1, 0.2, 0.3),
+                  position=(0.5, 0, 0.2), orientation=(0.3, -0.2, 0.5), shape=box))  # fmt: skip
+    m.add(fb.Body("b", mass=1, inertia=(0.1, 0.1, 0.1), position=(1, 0, 0)))
+    m.add(fb.Body("c", mass=0.5, inertia=(0.1, 0.1, 0.1), position=(1, 1, 0)), fb.Frame("tip", "c", position=(0, 0, 1)))
+    m.add(fb.Revolute("J", "ground", "a", at=(0, 0, 0.1), axis=(1, 1, 0)))
+    m.add(fb.Prismatic("K", "b", "a", at=(0.7, 0, 0), axis=(0, 1, 2)))  # reversed
+    m.add(fb.Revolute("L", "b", "c", at=(1, 0.5, 0), axis=(0, 0, 1)))
+    m.add(fb.Limit("stop", "J.angle", lower="-20 deg", upper=1.0), fb.CoordinateSpring("d", "J.angle", damping=0.4))
+    m.add(fb.Brake("f", "K.displacement", capacity=0.3))
+    path = tmp_path / "arm.urdf"
+    m.save(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        n = fb.load(path)
+    p, r = m.prepare(coordinates="joint"), n.prepare(coordinates="joint")
+    assert p.names == r.names
+    rng = np.random.default_rng(0)
+    q, v, a = rng.uniform(-1, 1, (3, 3))
+    np.testing.assert_allclose(r.rnea(q, v, a), p.rnea(q, v, a), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(r.pose("tip", q)[0], p.pose("tip", q)[0], atol=1e-13)
+    np.testing.assert_allclose(r.forces(0, q, v), p.forces(0, q, v), rtol=1e-11, atol=1e-11)
+    assert (n["J_limit"].lower, n["J_limit"].upper) == (pytest.approx(np.radians(-20)), 1.0)
+    assert n["a"].shapes()[0].edges == (0.1, 0.2, 0.3)
+
+
+def test_what_cannot_be_written(tmp_path):
+    m = fb.Mechanism("m")
+    m.add(fb.Body("a", mass=1, inertia=(1, 1, 1)), fb.Body("b", mass=1, inertia=(1, 1, 1), position=(1, 0, 0)))
+    m.add(fb.Revolute("J", "ground", "a", at=(0, 0, 0), axis=(0, 0, 1)))
+    with pytest.raises(fb.ModelError, match="several parts that no joint connects"):
+        m.save(tmp_path / "m.urdf")
+    m.add(
+        fb.Revolute("K", "a", "b", at=(1, 0, 0), axis=(0, 0, 1)),
+        fb.SpringDamper("s", "a", "b", stiffness=1, at=((0, 0, 0), (1, 1, 0))),
+    )
+    with pytest.warns(fb.ModelWarning, match="no counterpart of SpringDamper 's'"):
+        m.save(tmp_path / "m.urdf")
+    m.add(fb.Revolute("L", "ground", "b", at=(1, 0, 0), axis=(0, 0, 1)))
+    with pytest.raises(fb.ModelError, match="close a loop"):
+        m.save(tmp_path / "m.urdf")
+    ball = m.changed({"L": None, "K": None})
+    ball.add(fb.Spherical("K", "a", "b", at=(1, 0, 0)))
+    with pytest.raises(fb.ModelError, match=r"Spherical 'K' has no counterpart in URDF"):
+        ball.save(tmp_path / "m.urdf")
