@@ -23,7 +23,7 @@ Describe a mechanism
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
-    load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one
+    load          read a mechanism from a TOML or Python file, a robot in urdf; ``m.save(path)`` writes one
 
 Look before you run
     m             its repr says what is in it; in a notebook with a picture
@@ -74,7 +74,7 @@ When something is wrong
     FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
     AssemblyError, SimulationError, MobilityError, SingularityError, NotConverged and AnalysisError for what was asked.
     Interrupted has what was computed until the user ended it. StartWarning tells what of a
-    described start could not be kept.
+    described start could not be kept, ModelWarning what of a robot's file is not used.
 
 Elements of your own: ``help(fb.elements)``; ``fb.testing.check_element(e)`` tests one. Orientations by themselves:
 ``help(fb.rotations)``. From a shell: ``flyball --help``.

@@ -87,7 +87,7 @@ def test_a_box_on_springs_that_touches_a_stop_has_nothing_left() -> None:
 def test_what_has_no_linear_model_is_refused_by_name() -> None:
     m = roller(fb.Sphere(radius=0.1), 0.0, (0.008,) * 3)
     m.add(fb.Body("top", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 0.3)))
-    with pytest.raises(fb.ModelError, match="body-top is a sticking contact of what is ball with what is ball"):
+    with pytest.raises(fb.ModelError, match="body-top is a sticking contact between a sphere and a sphere"):
         m.modes()
     m = roller(fb.Sphere(radius=0.1), 0.0, (0.008,) * 3).changed({"floor": None})
     m.add(fb.Ground("floor", shape=fb.Plane(normal=(0.1, 0, 1)), position=(0, 0, -0.0005)))

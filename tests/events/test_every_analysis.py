@@ -61,7 +61,8 @@ DRIVEN = {"kinematics", "inverse_dynamics"}
 SLIDES = {"prepare", "symbolic", "export"}
 KNOWN = {
     **dict.fromkeys(("JointFriction", "Brake", "Clutch"), POSITIONS | HOLDS | DRIVEN | SLIDES),
-    **dict.fromkeys(("Limit", "Backlash", "OneWay", "Rope"), POSITIONS | HOLDS | DRIVEN),
+    "Limit": POSITIONS | HOLDS | DRIVEN | {"prepare"},
+    **dict.fromkeys(("Backlash", "OneWay", "Rope"), POSITIONS | HOLDS | DRIVEN),
     "Ratchet": POSITIONS | HOLDS,
     "ShearPin": POSITIONS | HOLDS,
     "Contact": POSITIONS | HOLDS,

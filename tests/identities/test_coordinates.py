@@ -260,7 +260,7 @@ def test_masses_of_which_several_coordinates_together_move_none_are_not_put_into
     m.add(fb.Distance("rod", "ground", "a", at=((0.1, 0.1), (0.71, 0.32))))
     m.add(fb.PointOnLine("slot", "a", "b", at=(0.48, 0.69), axis=(0, 1)))
     joint, absolute = (m.simulate(0.01, outputs=1001, coordinates=c) for c in ("joint", "absolute"))
-    assert "no joint that has inertia along its coordinates" in joint.health.coordinates
+    assert "absolute: a has no inertia" in joint.health.coordinates
     assert joint["a"].acceleration == pytest.approx(absolute["a"].acceleration, rel=1e-6, abs=1e-6)
 
 

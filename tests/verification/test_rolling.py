@@ -155,8 +155,8 @@ def bicycle(speed):
 def test_a_bicycle_rides_straight_on():
     """Weave, castering and capsize at 5 m/s, by the published digits of the benchmark."""
     m = bicycle(5.0)
-    e = m.equilibrium(turning=["fork.x", "rear hub.angle", "front hub.angle"])
-    assert e.speeds == pytest.approx({"fork.x": 5.0, "rear hub.angle": 5 / 0.3, "front hub.angle": 5 / 0.35})
+    e = m.equilibrium(turning=["frame.x", "rear hub.angle", "front hub.angle"])
+    assert e.speeds == pytest.approx({"frame.x": 5.0, "rear hub.angle": 5 / 0.3, "front hub.angle": 5 / 0.35})
     found = m.linearize(about=e).eigenvalues
     for published in (-0.77534188219585 + 4.46486771378823j, -14.0783896927982, -0.32286642900409):
         assert np.abs(found - published).min() < 1e-6, published
@@ -165,6 +165,6 @@ def test_a_bicycle_rides_straight_on():
 def test_what_a_steady_motion_cannot_fulfil_is_named():
     """Wheels that turn while all else stands still slip: not a force of 1e-13 N is in the way, but a joint."""
     with pytest.raises(
-        fb.NotConverged, match=r"RollingDisk '\w+ rolls' is not fulfilled .*rolls along, too \(one of fork\.x"
+        fb.NotConverged, match=r"RollingDisk '\w+ rolls' is not fulfilled .*rolls along, too \(one of frame\.x"
     ):
         bicycle(5.0).equilibrium(turning=["rear hub.angle"])

@@ -6,7 +6,8 @@ accelerations and forces are unique all the same.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, pooled_w
 from ..errors import AnalysisError, ModelError
 
 if TYPE_CHECKING:
-    from .prepared import Prepared
+    from .recursive_methods import BatchDynamics
 
 Array = np.ndarray
 RANK = 1e-9
@@ -34,132 +35,161 @@ class Constraints(NamedTuple):
     gamma: Array  # (k, nr)
 
 
-def constraints(p: Prepared, q: Array, v: Array) -> Constraints:
-    """Constraint rows at states (k, nq), (k, nv).
+@dataclass(frozen=True)
+class ClosedLoops:
+    """The loops of a prepared mechanism.
 
-    Raises
-    ------
-    AnalysisError
-        If a state violates them, or the mechanism has drivers or curves, whose rows depend on more than the state.
+    Attributes
+    ----------
+    dynamics : BatchDynamics
+        Of the tree.
+    names, rows : tuple of str
+        Velocities, and constraint rows.
+    q : ndarray, (nq,)
+        The start.
+    turns : ndarray, (angles, nq)
+        Derivatives of turned angles by the coordinates.
+    mass_matrix, bias_forces : callable
+        Of the tree, at many states.
     """
-    x = p._recursive
-    c, k, nr = x.compiled, len(q), len(p.rows)
-    if p.model.drivers or c.has_curves:
-        raise AnalysisError(
-            f"{p.model.name!r} has drivers or curves, and recursive dynamics with closed loops supports neither; "
-            "p.acceleration does. Leave drivers out, m.changed({...: None}), and name their coordinates as drives"
+
+    dynamics: BatchDynamics
+    names: tuple[str, ...]
+    rows: tuple[str, ...]
+    q: Array
+    turns: Array
+    mass_matrix: Callable[[Array], Array]
+    bias_forces: Callable[[Array, Array], Array]
+
+    def constraints(self, q: Array, v: Array) -> Constraints:
+        """Constraint rows at states (k, nq), (k, nv).
+
+        Raises
+        ------
+        AnalysisError
+            If a state violates them, or the mechanism has drivers or curves, whose rows depend on more than the state.
+        """
+        x = self.dynamics
+        c, k, nr = x.compiled, len(q), len(self.rows)
+        if x.structure.model.drivers or c.has_curves:
+            raise AnalysisError(
+                f"{self._name!r} has drivers or curves, and recursive dynamics with closed loops supports neither; "
+                "p.acceleration does. Leave drivers out, m.changed({...: None}), and name their coordinates as drives"
+            )
+        z = np.tile(c.z, (k, 1))
+        if len(x.system.angles.F):
+            z[:, x.system.angles.state] += (q - self.q) @ self.turns.T
+        arrays = ConstraintArrays(
+            np.hstack([q, v, z]), np.zeros((k, nr, len(self.names))), np.zeros((k, nr)), np.zeros((k, nr))
         )
-    z = np.tile(c.z, (k, 1))
-    if len(x.system.angles.F):
-        z[:, x.system.angles.state] += (q - p.q) @ p._by_coordinates.T
-    arrays = ConstraintArrays(np.hstack([q, v, z]), np.zeros((k, nr, len(p.v))), np.zeros((k, nr)), np.zeros((k, nr)))
-    clock, output = idle_clock_pool(arrays.y.shape[1]).new(), StructBuffer(OutputBuffer(np.zeros((1, 1))))
-    work = pooled_work(x.structure, x.system, np.float64)
-    constraint_kernel(engine.address, x.tables, work, idle_tableau(), clock, output, StructBuffer(arrays))
-    size = np.where(x.system.row_levers == 1.0, x.system.scales.length, 1.0)
-    off = np.abs(arrays.value) / size
-    if off.max(initial=0.0) > OFF_CONSTRAINTS:
-        i, row = np.unravel_index(np.argmax(off), off.shape)
-        raise AnalysisError(
-            f"state {i} violates the constraints of {p.model.name!r}: {p.rows[row]!r} is off by "
-            f"{arrays.value[i, row]:.3g}. Recursive dynamics with closed loops needs states that satisfy them"
-        )
-    return Constraints(arrays.jacobian, arrays.gamma)
+        clock, output = idle_clock_pool(arrays.y.shape[1]).new(), StructBuffer(OutputBuffer(np.zeros((1, 1))))
+        work = pooled_work(x.structure, x.system, np.float64)
+        constraint_kernel(engine.address, x.tables, work, idle_tableau(), clock, output, StructBuffer(arrays))
+        off = np.abs(arrays.value) * x.system.row_levers / x.system.scales.length
+        if off.max(initial=0.0) > OFF_CONSTRAINTS:
+            i, row = np.unravel_index(np.argmax(off), off.shape)
+            raise AnalysisError(
+                f"state {i} violates the constraints of {self._name!r}: {self.rows[row]!r} is off by "
+                f"{arrays.value[i, row]:.3g}. Recursive dynamics with closed loops needs states that satisfy them"
+            )
+        return Constraints(arrays.jacobian, arrays.gamma)
 
+    @property
+    def _name(self) -> str:
+        return self.dynamics.structure.model.name
 
-def _unit_rows(rows: Constraints) -> tuple[Array, Array]:
-    """Rows divided by their norms, and the norms."""
-    norms = np.linalg.norm(rows.jacobian, axis=2, keepdims=True)
-    norms[norms == 0.0] = 1.0
-    return rows.jacobian / norms, norms[..., 0]
+    @staticmethod
+    def _unit_rows(rows: Constraints) -> tuple[Array, Array]:
+        """Rows divided by their norms, and the norms."""
+        norms = np.linalg.norm(rows.jacobian, axis=2, keepdims=True)
+        norms[norms == 0.0] = 1.0
+        return rows.jacobian / norms, norms[..., 0]
 
+    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+        """Accelerations (k, nv) and multipliers (k, nr); with dependent rows the multipliers of least norm.
 
-def forward_dynamics(p: Prepared, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-    """Accelerations (k, nv) and multipliers (k, nr); with dependent rows the multipliers of least norm.
+        With M = L L^T and X = L^-1 G^T the accelerations are those without loops plus L^-T y, where y is the shortest
+        vector with X^T y = gamma - G a.
+        """
+        rows = self.constraints(q, v)
+        G, norms = self._unit_rows(rows)
+        M, free = self.mass_matrix(q), tau - self.bias_forces(q, v)
+        L = np.linalg.cholesky(M)
+        a = np.linalg.solve(M, free[..., None])
+        X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
+        left = (rows.gamma / norms)[..., None] - G @ a
+        y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ left
+        a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
+        lam = np.linalg.pinv(X, rcond=RANK) @ y
+        return a[..., 0], lam[..., 0] / norms
 
-    With M = L L^T and X = L^-1 G^T the accelerations are those without loops plus L^-T y, where y is the shortest
-    vector with X^T y = gamma - G a.
-    """
-    rows = constraints(p, q, v)
-    G, norms = _unit_rows(rows)
-    M, free = p.mass_matrix(q), tau - p.bias_forces(q, v)
-    L = np.linalg.cholesky(M)
-    a = np.linalg.solve(M, free[..., None])
-    X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
-    left = (rows.gamma / norms)[..., None] - G @ a
-    y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ left
-    a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
-    lam = np.linalg.pinv(X, rcond=RANK) @ y
-    return a[..., 0], lam[..., 0] / norms
+    def drive_forces(self, forces: Array, q: Array, v: Array, drives: Sequence[str]) -> Array:
+        """Forces (k, drives) along the drives that replace generalised forces (k, nv) of the tree.
 
+        S^T u + G^T lam = forces.
 
-def drive_forces(p: Prepared, forces: Array, q: Array, v: Array, drives: Sequence[str]) -> Array:
-    """Forces (k, drives) along the drives that replace generalised forces (k, nv) of the tree.
+        Raises
+        ------
+        AnalysisError
+            If the drives cannot make them, or share them with the loops or each other.
+        """
+        at = self._places(drives)
+        G, _ = self._unit_rows(self.constraints(q, v))
+        k, n = len(q), len(at)
+        S = np.zeros((k, n, len(self.names)))
+        S[:, np.arange(n), at] = 1.0
+        both = np.concatenate([S, G], axis=1)
+        self._refuse_undetermined(both, G, drives)
+        solved = np.linalg.pinv(np.swapaxes(both, 1, 2), rcond=RANK) @ forces[..., None]
+        left = np.abs(np.swapaxes(both, 1, 2) @ solved - forces[..., None]).max(initial=0.0)
+        if left > 1e-6 * np.abs(forces).max(initial=np.finfo(float).tiny):
+            raise AnalysisError(
+                f"the drives {', '.join(drives)} of {self._name!r} cannot give these accelerations: it has more "
+                "freedoms"
+            )
+        return solved[:, :n, 0]
 
-    S^T u + G^T lam = forces.
+    def dependent_velocities(self, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
+        """B (k, nv, f) and c (k, nv) of all velocities v = B w and accelerations B wdot + c by the independent ones w.
 
-    Raises
-    ------
-    AnalysisError
-        If the drives cannot make them, or share them with the loops or each other.
-    """
-    at = _places(p, drives)
-    G, _ = _unit_rows(constraints(p, q, v))
-    k, n = len(q), len(at)
-    S = np.zeros((k, n, len(p.v)))
-    S[:, np.arange(n), at] = 1.0
-    both = np.concatenate([S, G], axis=1)
-    _refuse_undetermined(p, both, G, drives)
-    solved = np.linalg.pinv(np.swapaxes(both, 1, 2), rcond=RANK) @ forces[..., None]
-    left = np.abs(np.swapaxes(both, 1, 2) @ solved - forces[..., None]).max(initial=0.0)
-    if left > 1e-6 * np.abs(forces).max(initial=np.finfo(float).tiny):
-        raise AnalysisError(
-            f"the drives {', '.join(drives)} of {p.model.name!r} cannot give these accelerations: it has more freedoms"
-        )
-    return solved[:, :n, 0]
+        Raises
+        ------
+        AnalysisError
+            If they do not determine all velocities, or are not independent.
+        """
+        at = self._places(independent)
+        rows = self.constraints(q, v)
+        G, norms = self._unit_rows(rows)
+        k, f = len(q), len(at)
+        S = np.zeros((k, f, len(self.names)))
+        S[:, np.arange(f), at] = 1.0
+        both = np.concatenate([S, G], axis=1)
+        self._refuse_undetermined(both, G, independent)
+        values = np.linalg.matrix_rank(both, rtol=RANK) if len(self.names) else np.zeros(k)
+        if (values < len(self.names)).any():
+            raise AnalysisError(
+                f"{', '.join(independent)} do not determine all velocities of {self._name!r} at state "
+                f"{int(np.argmin(values))}; it has {len(self.names) - int(values.min())} more freedoms there"
+            )
+        inverse = np.linalg.pinv(both, rcond=RANK)
+        c = inverse[..., f:] @ (rows.gamma / norms)[..., None]
+        return inverse[..., :f], c[..., 0]
 
+    def _refuse_undetermined(self, both: Array, G: Array, names: Sequence[str]) -> None:
+        """Refuse velocities that are not independent of each other and of the rows."""
+        added = np.linalg.matrix_rank(both, rtol=RANK) - np.linalg.matrix_rank(G, rtol=RANK)
+        if (added < len(names)).any():
+            raise AnalysisError(
+                f"{', '.join(names)} are not independent in {self._name!r} at state {int(np.argmin(added))}: name "
+                f"{int(added.min())} velocities there"
+            )
 
-def dependent_velocities(p: Prepared, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
-    """B (k, nv, f) and c (k, nv) of all velocities v = B w and accelerations B wdot + c by the independent ones w.
-
-    Raises
-    ------
-    AnalysisError
-        If they do not determine all velocities, or are not independent.
-    """
-    at = _places(p, independent)
-    rows = constraints(p, q, v)
-    G, norms = _unit_rows(rows)
-    k, f = len(q), len(at)
-    S = np.zeros((k, f, len(p.v)))
-    S[:, np.arange(f), at] = 1.0
-    both = np.concatenate([S, G], axis=1)
-    _refuse_undetermined(p, both, G, independent)
-    values = np.linalg.matrix_rank(both, rtol=RANK) if len(p.v) else np.zeros(k)
-    if (values < len(p.v)).any():
-        raise AnalysisError(
-            f"{', '.join(independent)} do not determine all velocities of {p.model.name!r} at state "
-            f"{int(np.argmin(values))}; it has {len(p.v) - int(values.min())} more freedoms there"
-        )
-    inverse = np.linalg.pinv(both, rcond=RANK)
-    c = inverse[..., f:] @ (rows.gamma / norms)[..., None]
-    return inverse[..., :f], c[..., 0]
-
-
-def _refuse_undetermined(p: Prepared, both: Array, G: Array, names: Sequence[str]) -> None:
-    """Refuse velocities that are not independent of each other and of the rows."""
-    added = np.linalg.matrix_rank(both, rtol=RANK) - np.linalg.matrix_rank(G, rtol=RANK)
-    if (added < len(names)).any():
-        raise AnalysisError(
-            f"{', '.join(names)} are not independent in {p.model.name!r} at state {int(np.argmin(added))}: name "
-            f"{int(added.min())} velocities there"
-        )
-
-
-def _places(p: Prepared, names: Sequence[str]) -> list[int]:
-    if isinstance(names, str) or not names:
-        raise ModelError(f"give a list of names of velocities, such as [{p.names[0]!r}], not {names!r}")
-    for name in names:
-        if name not in p.names:
-            raise ModelError(f"{name!r} is no velocity of {p.model.name!r} in these coordinates: {', '.join(p.names)}")
-    return [p.names.index(name) for name in names]
+    def _places(self, names: Sequence[str]) -> list[int]:
+        if isinstance(names, str) or not names:
+            raise ModelError(f"give a list of names of velocities, such as [{self.names[0]!r}], not {names!r}")
+        for name in names:
+            if name not in self.names:
+                raise ModelError(
+                    f"{name!r} is no velocity of {self._name!r} in these coordinates: {', '.join(self.names)}"
+                )
+        return [self.names.index(name) for name in names]

@@ -94,10 +94,22 @@ class _Starts(NamedTuple):
     upper: Array
 
 
-def inverse_kinematics(
-    p: Prepared, frame: str, position: Any, rotation: Any, near: Any, starts: int, seed: int
-) -> InverseKinematics:
+class PoseRequest(NamedTuple):
+    """Arguments of `Prepared.inverse_kinematics`, and the units of the coordinates."""
+
+    frame: str
+    position: Any
+    rotation: Any
+    near: Array
+    starts: int
+    seed: int
+    sizes: Array  # (nv,): the mechanism's length, or a radian
+    length: float
+
+
+def inverse_kinematics(p: Prepared, request: PoseRequest) -> InverseKinematics:
     """See `Prepared.inverse_kinematics`."""
+    frame, starts = request.frame, request.starts
     if p.rows:
         closing = ", ".join(dict.fromkeys(row.partition(":")[0] for row in p.rows))
         raise AnalysisError(
@@ -106,8 +118,8 @@ def inverse_kinematics(
         )
     if not isinstance(starts, int) or starts < 1:
         raise ModelError(f"starts is {starts!r}; it must be a number of configurations to begin from, 1 or more")
-    target = _target(p, frame, position, rotation)
-    begin = _starts(p, near, starts, seed)
+    target = _target(p, request)
+    begin = _starts(p, request)
     q, error = _iterate(p, target, begin)
     good = np.linalg.norm(error, axis=1) <= ACCEPTED
     if not good.any():
@@ -118,10 +130,11 @@ def inverse_kinematics(
             f"the nearest found misses it by {shift:.4g} m and {np.degrees(turn):.4g} deg. It may be out of reach or "
             f"beyond stops; more starts= search farther"
         )
-    return _distinct(p, target, q[good], begin)
+    return _distinct(p, target, q[good], begin, request.sizes)
 
 
-def _target(p: Prepared, frame: str, position: Any, rotation: Any) -> _Target:
+def _target(p: Prepared, request: PoseRequest) -> _Target:
+    position, rotation = request.position, request.rotation
     planar = p.model.planar
     if position is None and rotation is None:
         raise ModelError("inverse_kinematics needs a position, a rotation, or both")
@@ -134,9 +147,8 @@ def _target(p: Prepared, frame: str, position: Any, rotation: Any) -> _Target:
         rows += [5] if planar else [3, 4, 5]
     if not (np.isfinite(where).all() and np.isfinite(R).all()):
         raise ModelError("position and rotation must be finite")
-    length = float(p._start.compiled.values.system.scales.length.real)
-    scale = np.array([1.0 / length] * 3 + [1.0] * 3)
-    return _Target(frame, where, R, np.array(rows), scale[rows])
+    scale = np.array([1.0 / request.length] * 3 + [1.0] * 3)
+    return _Target(request.frame, where, R, np.array(rows), scale[rows])
 
 
 def _ranges(p: Prepared) -> tuple[Array, Array]:
@@ -151,15 +163,14 @@ def _ranges(p: Prepared) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _starts(p: Prepared, near: Any, starts: int, seed: int) -> _Starts:
+def _starts(p: Prepared, request: PoseRequest) -> _Starts:
     """The wanted configuration, and random ones: angles anywhere, lengths about it as far as the mechanism's length."""
-    first = p.q if near is None else p._states((near,))[0][0][0]
+    first, sizes = request.near, request.sizes
     lower, upper = _ranges(p)
-    sizes = p._start.compiled.sizes
     angles = _is_rotation(p)
     low = np.where(np.isfinite(lower), lower, np.where(angles, -np.pi, -sizes))
     high = np.where(np.isfinite(upper), upper, np.where(angles, np.pi, sizes))
-    shifts = np.random.default_rng(seed).uniform(low, np.maximum(low, high), (starts - 1, len(low)))
+    shifts = np.random.default_rng(request.seed).uniform(low, np.maximum(low, high), (request.starts - 1, len(low)))
     plain = len(p.q) == len(p.v)
     others = shifts if plain else np.array([p.step(first, d) for d in shifts]).reshape(-1, len(p.q))
     return _Starts(np.concatenate([first[None], others]), lower, upper)
@@ -225,13 +236,13 @@ def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
     return q, error
 
 
-def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinematics:
+def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts, sizes: Array) -> InverseKinematics:
     """Different solutions, the nearest to the first start first; unlimited angles within half a turn of it."""
     first = begin.q[0]
     turn, units = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
     if q.shape[1] == len(p.v):
         turn[_is_rotation(p) & ~np.isfinite(begin.lower) & ~np.isfinite(begin.upper)] = 2.0 * np.pi
-        units = p._start.compiled.sizes
+        units = sizes
 
     def difference(a: Array, b: Array) -> Array:
         return a - b - np.where(np.isfinite(turn), turn * np.round((a - b) / turn), 0.0)

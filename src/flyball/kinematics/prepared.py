@@ -29,7 +29,7 @@ from ..results.recorded_kinematics import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
-from .inverse_kinematics import InverseKinematics, inverse_kinematics
+from .inverse_kinematics import InverseKinematics, PoseRequest, inverse_kinematics
 from .recursive_methods import RecursiveMethods
 
 
@@ -208,7 +208,10 @@ class Prepared(RecursiveMethods):
         AnalysisError
             If joints close loops.
         """
-        return inverse_kinematics(self, frame, position, rotation, near, starts, seed)
+        c = self._start.compiled
+        first = self.q if near is None else self._states((near,))[0][0][0]
+        length = float(c.values.system.scales.length.real)
+        return inverse_kinematics(self, PoseRequest(frame, position, rotation, first, starts, seed, c.sizes, length))
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}

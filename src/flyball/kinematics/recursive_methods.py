@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,11 +33,10 @@ from ..engine.recursive_dynamics import tree_dynamics, velocity_paths
 from ..errors import AnalysisError, ModelError
 from ..model.body import GROUND, Frame
 from ..tables.table_definitions import FREE, SPHERICAL, System
-from .closed_loops import dependent_velocities, drive_forces, forward_dynamics
+from .closed_loops import ClosedLoops
 
 if TYPE_CHECKING:
     from ..assembly.assembled_state import Assembly
-    from .prepared import Prepared
 
 Array = np.ndarray
 _NO_COLUMNS = np.zeros((1, 0, 0))
@@ -308,7 +307,7 @@ class RecursiveMethods:
         """
         if drives is not None:
             forces = self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), None, threads)[0]
-            return self._for_states(lambda x, y, f: drive_forces(cast("Prepared", self), f, x, y, drives), q, v, forces)
+            return self._for_states(lambda x, y, f: self._loops.drive_forces(f, x, y, drives), q, v, forces)
         return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
 
     def bias_forces(self, q: Array, v: Array, *, out: Array | None = None, threads: int = 1) -> Array:
@@ -368,7 +367,7 @@ class RecursiveMethods:
             If a velocity moves no inertia; with closed loops also if a state violates the constraints.
         """
         if self.rows:
-            found = self._for_states(lambda x, y, f: forward_dynamics(cast("Prepared", self), x, y, f)[0], q, v, tau)
+            found = self._for_states(lambda x, y, f: self._loops.forward_dynamics(x, y, f)[0], q, v, tau)
             if out is None:
                 return found
             _result_arrays([found.shape], out)[0][:] = found
@@ -383,7 +382,7 @@ class RecursiveMethods:
         ndarray, (nr,) or (k, nr)
             In the order of `Prepared.rows`. With dependent rows those of least norm.
         """
-        return self._for_states(lambda x, y, f: forward_dynamics(cast("Prepared", self), x, y, f)[1], q, v, tau)
+        return self._for_states(lambda x, y, f: self._loops.forward_dynamics(x, y, f)[1], q, v, tau)
 
     def dependent_velocities(self, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
         """All velocities and accelerations of a mechanism with closed loops, by independent ones w.
@@ -408,7 +407,7 @@ class RecursiveMethods:
             If these velocities are not independent, or do not determine the others.
         """
         B, c = self._for_states(
-            lambda x, y, _: dependent_velocities(cast("Prepared", self), x, y, independent), q, v, v, several=True
+            lambda x, y, _: self._loops.dependent_velocities(x, y, independent), q, v, v, several=True
         )
         return B, c
 
@@ -587,6 +586,17 @@ class RecursiveMethods:
         if found is None:
             found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names, self.specialized)
         return found
+
+    @property
+    def _by_coordinates(self) -> Array:
+        """Derivatives of turned angles by the coordinates, (angles, nq)."""
+        raise NotImplementedError
+
+    @property
+    def _loops(self) -> ClosedLoops:
+        return ClosedLoops(
+            self._recursive, self.names, self.rows, self.q, self._by_coordinates, self.mass_matrix, self.bias_forces
+        )
 
     def _require_tree(self, method: str) -> None:
         if self.rows:

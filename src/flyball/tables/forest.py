@@ -214,7 +214,9 @@ def joint_bodies(model: Model, joint: Joint) -> tuple[str, str]:
 
 
 def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
-    """Bodies with their tree joints, parents first; of a part that is not connected to ground the first body is free.
+    """Bodies with their tree joints, parents first.
+
+    Of a part that is not connected to ground, the first body that is the second one of no tree joint is free.
 
     Raises
     ------
@@ -223,15 +225,17 @@ def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
     """
     near: dict[str, list[tuple[Joint, str, bool]]] = {GROUND: []}
     near |= {b.name: [] for b in model.bodies}
+    seconds = set()
     for name in tree:
         joint = model[name]
         a, b = joint_bodies(model, joint)
         near[a].append((joint, b, False))
         near[b].append((joint, a, True))
+        seconds.add(b)
     out: list[TreeBody] = []
     seen = {GROUND}
     _append_chains(near, GROUND, seen, out)
-    for body in model.bodies:
+    for body in sorted(model.bodies, key=lambda x: x.name in seconds):
         if body.name not in seen:
             out.append(TreeBody(body.name))
             seen.add(body.name)
