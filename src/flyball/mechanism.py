@@ -64,11 +64,12 @@ for _family in (
 
 
 def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
-    """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, Python, or a robot in URDF.
+    """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, Python, or a robot in URDF or MJCF.
 
     A file ``*.py`` is executed, as on the command line; it defines ``m``, ``mechanism`` or ``mechanism()``. A file
-    ``*.urdf`` is a robot: its links are bodies, a link without mass that is fixed to another is a frame. What of it has
-    no meaning here is listed in a `ModelWarning`.
+    ``*.urdf`` is a robot: its links are bodies, a link without mass that is fixed to another is a frame. A file
+    ``*.xml`` or ``*.mjcf`` is a model of MuJoCo, whose own reader is needed (the package mujoco). What of them has no
+    meaning here is listed in a `ModelWarning`.
 
     Parameters
     ----------
@@ -90,6 +91,10 @@ def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
         from .model.python_file import load_python
 
         return load_python(given, Mechanism)
+    if given.suffix.lower() in (".xml", ".mjcf"):
+        from .robots.mjcf import load_mjcf
+
+        return load_mjcf(given, Mechanism)
     if given.suffix.lower() == ".urdf":
         from .robots.urdf import load_urdf
 

@@ -73,6 +73,10 @@ def test_two_links():
     np.testing.assert_allclose(np.cos(angle.q.sum(axis=1) - 1.0), 1.0, atol=1e-12)
     limited = m.changed({})
     limited.add(fb.Limit("stop", "K.angle", lower=0.0, upper=3.0))
+    turned = m.changed({"K": fb.Revolute("K", "A", "B", at=(a, 0), angle=1.0)})  # as drawn its angle is 1
+    turned.add(fb.Limit("stop", "K.angle", lower=1.0, upper=4.0))
+    (same,) = turned.prepare(coordinates="joint").inverse_kinematics("tip", (x, y)).q
+    assert same[1] == pytest.approx(elbow)
     (only,) = limited.prepare(coordinates="joint").inverse_kinematics("tip", (x, y)).q
     assert only[1] == pytest.approx(elbow)
 

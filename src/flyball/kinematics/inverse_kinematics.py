@@ -104,6 +104,7 @@ class PoseRequest(NamedTuple):
     starts: int
     seed: int
     sizes: Array  # (nv,): the mechanism's length, or a radian
+    drawn: Array  # (nv,): values of the coordinates where q is zero
     length: float
 
 
@@ -151,22 +152,22 @@ def _target(p: Prepared, request: PoseRequest) -> _Target:
     return _Target(request.frame, where, R, np.array(rows), scale[rows])
 
 
-def _ranges(p: Prepared) -> tuple[Array, Array]:
-    """Range of each velocity's coordinate, from stops along it."""
+def _ranges(p: Prepared, drawn: Array) -> tuple[Array, Array]:
+    """Range of each velocity's entry of q, from stops along its coordinate."""
     lower, upper = np.full(len(p.v), -np.inf), np.full(len(p.v), np.inf)
     numbers = element_numbers(p.model, p.parameters_given).of
     for e in p.model.limits:
         if isinstance(e, Limit) and e.coordinate in p.names:
             n, d = numbers[e.name], p.names.index(e.coordinate)
-            lower[d] = max(lower[d], -np.inf if n.lower is None else float(n.lower))
-            upper[d] = min(upper[d], np.inf if n.upper is None else float(n.upper))
+            lower[d] = max(lower[d], -np.inf if n.lower is None else float(n.lower) - drawn[d])
+            upper[d] = min(upper[d], np.inf if n.upper is None else float(n.upper) - drawn[d])
     return lower, upper
 
 
 def _starts(p: Prepared, request: PoseRequest) -> _Starts:
     """The wanted configuration, and random ones: angles anywhere, lengths about it as far as the mechanism's length."""
     first, sizes = request.near, request.sizes
-    lower, upper = _ranges(p)
+    lower, upper = _ranges(p, request.drawn)
     angles = _is_rotation(p)
     low = np.where(np.isfinite(lower), lower, np.where(angles, -np.pi, -sizes))
     high = np.where(np.isfinite(upper), upper, np.where(angles, np.pi, sizes))

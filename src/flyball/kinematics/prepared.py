@@ -50,8 +50,8 @@ class Prepared(RecursiveMethods):
     q, v : ndarray (nq,), (nv,)
         The start: as described and assembled at t = 0. A free spatial body has x, y, z of its centre of mass and a
         quaternion (scalar first) in q, and the velocity of that point in world axes and its angular velocity in body
-        axes in v; a planar one x, y, angle. Tree joints have their coordinates, spherical ones a quaternion and the
-        angular velocity in the moved axes.
+        axes in v; a planar one x, y, angle. Tree joints have their coordinates, measured from the drawn
+        configuration, spherical ones a quaternion and the angular velocity in the moved axes.
     names : tuple of str
         The coordinate whose rate each velocity is, (nv,).
     rows : tuple of str
@@ -208,10 +208,11 @@ class Prepared(RecursiveMethods):
         AnalysisError
             If joints close loops.
         """
-        c = self._start.compiled
+        x = self._recursive
         first = self.q if near is None else self._states((near,))[0][0][0]
-        length = float(c.values.system.scales.length.real)
-        return inverse_kinematics(self, PoseRequest(frame, position, rotation, first, starts, seed, c.sizes, length))
+        length, drawn = float(x.system.scales.length), x.system.bodies.offset[x.paths.body]
+        request = PoseRequest(frame, position, rotation, first, starts, seed, x.compiled.sizes, drawn, length)
+        return inverse_kinematics(self, request)
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}

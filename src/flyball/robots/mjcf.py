@@ -1,0 +1,264 @@
+"""Reading of models in MJCF, by MuJoCo's own reader: default classes, includes and references are resolved by it.
+
+A body is a body whose reference frame is the body's frame; the drawn configuration is that of `qpos0`. Joints of one
+body are a chain of massless links. What has no meaning here is listed in a `ModelWarning`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import ModelError, ModelWarning, warn_user
+from ..forces.clutch import Brake
+from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.limit import Limit
+from ..joints.coupler import Coupler
+from ..joints.fixed import Fixed
+from ..joints.prismatic import Prismatic
+from ..joints.revolute import Revolute
+from ..joints.spherical import Spherical
+from ..model.body import GROUND, Body, Frame, Ground
+from ..model.element import Element
+from ..model.geometry import quaternion_to_matrix
+from ..model.model import Model
+from ..model.shapes.box import Box
+from ..model.shapes.capsule import Capsule
+from ..model.shapes.cylinder import Cylinder
+from ..model.shapes.ellipsoid import Ellipsoid
+from ..model.shapes.mesh import Mesh
+from ..model.shapes.plane import Plane
+from ..model.shapes.solid import Solid
+from ..model.shapes.sphere import Sphere
+from .urdf import rows
+
+T = TypeVar("T", bound=Model)
+FREE, BALL, SLIDE, HINGE = range(4)
+"""MuJoCo's kinds of joints (mjtJoint)."""
+COORDINATES = {SLIDE: "displacement", HINGE: "angle"}
+
+
+def load_mjcf(path: Path, make: Callable[..., T]) -> T:
+    """Read a model from an MJCF file.
+
+    Raises
+    ------
+    ModelError
+        If MuJoCo is not installed, or refuses the file: with its message, which names element and line.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise ModelError(f"{path}: MJCF is read by MuJoCo; install it: pip install 'flyball[mjcf]'") from None
+    if not path.is_file():
+        raise ModelError(f"{path} cannot be read: there is no such file")
+    try:
+        return _Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), path).mechanism(make)
+    except ValueError as error:
+        if isinstance(error, ModelError):
+            raise
+        raise ModelError(f"{path}: {' '.join(str(error).split())}") from None
+
+
+class _Reader:
+    """One compiled model being read."""
+
+    def __init__(self, mujoco: Any, model: Any, path: Path) -> None:
+        self.mujoco, self.M, self.path = mujoco, model, path
+        self.D = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self.D)
+        self.taken: set[str] = {GROUND}
+        self.bodies: dict[int, str] = {0: GROUND}
+        self.joints: dict[int, str] = {}
+        self.unused: list[str] = []
+
+    def name(self, kind: str, k: int, default: str) -> str:
+        """A name that flyball permits and that is not taken."""
+        given = self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k)
+        return self.free_name(given or default)
+
+    def free_name(self, wanted: str) -> str:
+        """The name, with other characters where Python permits none, and not one that is taken."""
+        plain = re.sub(r"\W", "_", wanted)
+        plain = plain if plain.isidentifier() else f"_{plain}"
+        while plain in self.taken:
+            plain += "_"
+        self.taken.add(plain)
+        return plain
+
+    def mechanism(self, make: Callable[..., T]) -> T:
+        """The mechanism."""
+        M = self.M
+        name = self.free_name(self.path.stem)
+        m = make(name, gravity=tuple(M.opt.gravity.tolist()))
+        later: list[Element] = []
+        for b in range(M.nbody):
+            joints = list(range(M.body_jntadr[b], M.body_jntadr[b] + M.body_jntnum[b])) if M.body_jntnum[b] else []
+            self._add_body(m, b, joints)
+            for j in joints:
+                later += self._losses(j)
+        m.add(*later)
+        for k in range(M.neq):
+            m.add(*self._equality(k))
+        parameters: dict[str, float] = {}
+        actuators = list(self._actuators(parameters))
+        if actuators:
+            m.parameters.update(parameters)
+            m.add(*actuators)
+        self._report()
+        return m
+
+    def _pose(self, b: int) -> dict[str, Any]:
+        return {"position": tuple(self.D.xpos[b].tolist()), "orientation": rows(self.D.xmat[b].reshape(3, 3))}
+
+    def _add_body(self, m: Model, b: int, joints: list[int]) -> None:
+        M = self.M
+        parent = self.bodies[M.body_parentid[b]] if b else GROUND
+        shapes = tuple(self._shapes(b))
+        if b == 0 or (not joints and parent == GROUND):
+            if b:
+                self.bodies[b] = GROUND
+                m.add(Frame(self.name("BODY", b, f"body{b}"), GROUND, **self._pose(b)))
+            if shapes:
+                m.add(Ground(self.free_name(f"ground{b}"), shape=shapes, **self._pose(b)))
+            return
+        name = self.bodies[b] = self.name("BODY", b, f"body{b}")
+        given: dict[str, Any] = {"mass": float(M.body_mass[b]), "inertia": 0.0}
+        if M.body_mass[b] > 0.0:
+            given |= {
+                "inertia": tuple(M.body_inertia[b].tolist()),
+                "com": tuple(M.body_ipos[b].tolist()),
+                "inertia_axes": rows(quaternion_to_matrix(M.body_iquat[b])),
+            }
+        m.add(Body(name, **given, **self._pose(b), shape=shapes or None))
+        links = [self.free_name(f"{name}_link{k}") for k in range(1, len(joints))]
+        for link in links:
+            m.add(Body(link, mass=0, inertia=0, **self._pose(b)))
+        ends = [parent, *links, name]
+        if not joints:
+            m.add(Fixed(self.free_name(f"{name}_fixed"), parent, name, at=tuple(self.D.xpos[b].tolist())))
+        for k, j in enumerate(joints):
+            if M.jnt_type[j] != FREE:
+                m.add(self._joint(j, ends[k], ends[k + 1]))
+
+    def _joint(self, j: int, first: str, second: str) -> Element:
+        M = self.M
+        name = self.joints[j] = self.name("JOINT", j, f"joint{j}")
+        at, axis = tuple(self.D.xanchor[j].tolist()), tuple(self.D.xaxis[j].tolist())
+        drawn = float(M.qpos0[M.jnt_qposadr[j]])
+        if M.jnt_type[j] == BALL:
+            return Spherical(name, first, second, at=at)
+        if M.jnt_type[j] == SLIDE:
+            return Prismatic(name, first, second, at=at, axis=axis, displacement=drawn)
+        return Revolute(name, first, second, at=at, axis=axis, angle=drawn)
+
+    def _losses(self, j: int) -> Iterator[Element]:
+        """Stops, spring, damping and friction of a joint."""
+        M, d = self.M, self.M.jnt_dofadr[j]
+        if M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]].any():
+            self.unused.append(f"armature of {self.joints.get(j, 'the free joint')}")
+        if M.jnt_type[j] not in COORDINATES:
+            if M.jnt_limited[j] or M.jnt_stiffness[j] or M.dof_damping[d] or M.dof_frictionloss[d]:
+                self.unused.append(f"limit, stiffness, damping or friction of {self.joints.get(j, 'the free joint')}")
+            return
+        name = self.joints[j]
+        along = f"{name}.{COORDINATES[M.jnt_type[j]]}"
+        if M.jnt_limited[j]:
+            lower, upper = M.jnt_range[j].tolist()
+            yield Limit(self.free_name(f"{name}_limit"), along, lower=lower, upper=upper)
+        stiffness, damping, friction = (float(x) for x in (M.jnt_stiffness[j], M.dof_damping[d], M.dof_frictionloss[d]))
+        if stiffness or damping:
+            rest = float(M.qpos_spring[M.jnt_qposadr[j]])
+            given = {"stiffness": stiffness, "rest": rest} if stiffness else {}
+            yield CoordinateSpring(self.free_name(f"{name}_spring"), along, damping=damping, **given)
+        if friction:
+            yield Brake(self.free_name(f"{name}_friction"), along, capacity=friction)
+
+    def _equality(self, k: int) -> Iterator[Element]:
+        """Equalities as hard joints: connect, weld, and linear relations of joints."""
+        M, kinds = self.M, self.mujoco.mjtEq
+        name = self.name("EQUALITY", k, f"equality{k}")
+        a, b, data = M.eq_obj1id[k], M.eq_obj2id[k], M.eq_data[k]
+        bodies = M.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_BODY
+        if not M.eq_active0[k]:
+            self.unused.append(f"equality {name}, which is not active")
+        elif M.eq_type[k] == kinds.mjEQ_CONNECT and bodies:
+            at = self.D.xpos[a] + self.D.xmat[a].reshape(3, 3) @ data[:3]
+            yield Spherical(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
+        elif M.eq_type[k] == kinds.mjEQ_WELD and bodies:
+            yield Fixed(name, self.bodies[a], self.bodies[b], at=tuple(self.D.xpos[a].tolist()))
+        elif M.eq_type[k] == kinds.mjEQ_JOINT and not data[2:5].any() and a in self.joints and b in self.joints:
+            ends = [f"{self.joints[j]}.{COORDINATES[M.jnt_type[j]]}" for j in (a, b)]
+            start = [float(M.qpos0[M.jnt_qposadr[j]]) for j in (a, b)]
+            value = float(data[0]) + start[0] - float(data[1]) * start[1]
+            yield Coupler(name, tuple(ends), weights=(1.0, -float(data[1])), value=value)
+        else:
+            self.unused.append(f"equality {name}")
+
+    def _actuators(self, parameters: dict[str, float]) -> Iterator[Element]:
+        """Actuators of joints: gear (gain control + bias), with the control as a parameter ``control_NAME``."""
+        M = self.M
+        for k in range(M.nu):
+            name = self.name("ACTUATOR", k, f"actuator{k}")
+            j = int(M.actuator_trnid[k, 0])
+            plain = M.actuator_dyntype[k] == 0 and M.actuator_gaintype[k] == 0 and M.actuator_biastype[k] <= 1
+            if (
+                M.actuator_trntype[k] not in (0, 1)
+                or j not in self.joints
+                or not plain
+                or M.jnt_type[j] not in COORDINATES
+            ):
+                self.unused.append(f"actuator {name}")
+                continue
+            gear, gain, bias = float(M.actuator_gear[k, 0]), float(M.actuator_gainprm[k, 0]), M.actuator_biasprm[k]
+            control = self.free_name(f"control_{name}")
+            parameters[control] = 0.0
+            force = f"{gear!r}*({gain!r}*{control}"
+            if M.actuator_biastype[k]:
+                force += f" + {float(bias[0])!r} + {float(bias[1])!r}*{gear!r}*value + {float(bias[2])!r}*{gear!r}*rate"
+            yield Actuator(name, f"{self.joints[j]}.{COORDINATES[M.jnt_type[j]]}", force=force + ")")
+
+    def _shapes(self, b: int) -> Iterator[Solid]:
+        """Shapes of a body, for display."""
+        M, kinds = self.M, self.mujoco.mjtGeom
+        for g in range(M.body_geomadr[b], M.body_geomadr[b] + M.body_geomnum[b]) if M.body_geomnum[b] else ():
+            R, size = quaternion_to_matrix(M.geom_quat[g]), M.geom_size[g].tolist()
+            given: dict[str, Any] = {"position": tuple(M.geom_pos[g].tolist()), "orientation": rows(R)}
+            kind = M.geom_type[g]
+            if kind == kinds.mjGEOM_PLANE:
+                yield Plane(**given)
+            elif kind == kinds.mjGEOM_SPHERE:
+                yield Sphere(radius=size[0], looks=True, **given)
+            elif kind == kinds.mjGEOM_CAPSULE:
+                yield Capsule(radius=size[0], length=2 * size[1], looks=True, **given)
+            elif kind == kinds.mjGEOM_CYLINDER:
+                yield Cylinder(radius=size[0], length=2 * size[1], looks=True, **given)
+            elif kind == kinds.mjGEOM_ELLIPSOID:
+                yield Ellipsoid(semi_axes=tuple(size), looks=True, **given)
+            elif kind == kinds.mjGEOM_BOX:
+                yield Box(edges=tuple(2 * x for x in size), looks=True, **given)
+            elif kind == kinds.mjGEOM_MESH:
+                k = M.geom_dataid[g]
+                first, at = M.mesh_vertadr[k], M.mesh_faceadr[k]
+                vertices = M.mesh_vert[first : first + M.mesh_vertnum[k]]
+                faces = M.mesh_face[at : at + M.mesh_facenum[k]]
+                yield Mesh(vertices=vertices.tolist(), faces=faces.tolist(), looks=True, **given)
+            else:
+                self.unused.append(f"a geom of {self.mujoco.mj_id2name(M, self.mujoco.mjtObj.mjOBJ_BODY, b)}")
+
+    def _report(self) -> None:
+        M = self.M
+        for count, what in (
+            (M.ntendon, "tendons"),
+            (M.nsensor, "sensors"),
+            (M.nsite, "sites"),
+            (M.npair, "contact pairs"),
+        ):
+            if count:
+                self.unused.append(f"{count} {what}")
+        if (M.geom_contype | M.geom_conaffinity).any():
+            self.unused.append("contact of geoms (add shapes without looks=True, and fb.Contact)")
+        if self.unused:
+            warn_user(f"{self.path.name}: not used: {'; '.join(dict.fromkeys(self.unused))}", ModelWarning)
