@@ -71,6 +71,11 @@ def test_backwards(case):
     tau = np.zeros((len(q), len(p.v)))
     tau[:, p.names.index("A.angle")] = torque[:, 0]
     np.testing.assert_allclose(p.aba(q, v, tau), a, rtol=1e-9, atol=1e-9)
+    out = np.empty((len(q), 1))
+    assert p.rnea(q, v, a, drives=["A.angle"], out=out) is out
+    np.testing.assert_array_equal(out, torque)
+    with pytest.raises(fb.AnalysisError, match="accelerations do not satisfy the constraints"):
+        p.rnea(q, v, a + 0.1, drives=["A.angle"])
     reduced = p.reduced_mass_matrix(q, ["A.angle"])  # the change of the torque per acceleration
     more = p.rnea(q, v, a + B[..., 0], drives=["A.angle"])
     np.testing.assert_allclose(reduced[:, 0, 0], (more - torque)[:, 0], rtol=1e-7)

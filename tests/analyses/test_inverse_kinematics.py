@@ -85,10 +85,25 @@ def test_a_free_body():
     m = fb.Mechanism("free")
     m.add(fb.Body("b", mass=1, inertia=(1, 2, 3), position=(1, 0, 0)))
     p = m.prepare(coordinates="joint")
-    found = p.inverse_kinematics("b", (0.3, -0.2, 0.1), (0.1, 0.2, 0.3), starts=3)
+    found = p.inverse_kinematics("b", (0.3, -0.2, 0.1), (0.1, 0.2, 0.3), starts=30)
+    assert len(found) == 1 and found.freedoms == 0
     x, R = p.pose("b", found.q[0])
     np.testing.assert_allclose(x, (0.3, -0.2, 0.1), atol=1e-12)
     np.testing.assert_allclose(R, Rotation.from_euler("XYZ", (0.1, 0.2, 0.3)).as_matrix(), atol=1e-12)
+
+
+def test_a_free_base_with_a_stop():
+    """A hand that only points: the stop of its one joint holds beside the quaternion of the base."""
+    m = fb.Mechanism("hand")
+    m.add(fb.Body("palm", mass=1, inertia=(1, 2, 3)), fb.Body("finger", mass=1, inertia=(1, 1, 1), position=(1, 0, 0)))
+    m.add(fb.Revolute("knuckle", "palm", "finger", at=(0.5, 0, 0), axis=(0, 1, 0)))
+    m.add(fb.Limit("stop", "knuckle.angle", lower=0.2, upper=0.9))
+    p = m.prepare(coordinates="joint")
+    found = p.inverse_kinematics("finger", (0.3, 0.4, 0.5), (0.1, 0.2, 0.3), starts=20)
+    assert found.freedoms == 1
+    assert ((found.q[:, 7] >= 0.2) & (found.q[:, 7] <= 0.9)).all()
+    for q in found.q:
+        np.testing.assert_allclose(p.pose("finger", q)[0], (0.3, 0.4, 0.5), atol=1e-9)
 
 
 def test_bad_input(ur5):

@@ -128,7 +128,7 @@ def test_meshes_are_found_beside_the_package(tmp_path):
         ((ARM, "<sdf/>"), r"arm.urdf, line 1: <sdf> is not URDF"),
         (('child link="slide"', 'child link="sledge"'), r"line 22: joint 'rail' connects the link 'sledge', which does not exist"),
         (('type="prismatic"', 'type="screw"'), "line 22: joint 'rail' has the unknown type 'screw'"),
-        (('parent link="base"', 'parent link="slide"'), "have no parent|form a circle"),
+        (('parent link="base"', 'parent link="slide"'), "form a cycle"),
         (('child link="tool"', 'child link="slide"'), "line 26: link 'slide' is the child of two joints, 'rail' and 'flange'"),
         (('<mass value="2"/>', '<mass value="nan"/>'), "line 8: value='nan' of <mass>: 1 finite numbers are needed"),
         (('<mass value="2"/>', ""), "line 6: <inertial> '' needs <mass>"),
@@ -208,3 +208,10 @@ def test_what_cannot_be_written(tmp_path):
     ball.add(fb.Spherical("K", "a", "b", at=(1, 0, 0)))
     with pytest.raises(fb.ModelError, match=r"Spherical 'K' has no counterpart in URDF"):
         ball.save(tmp_path / "m.urdf")
+
+
+def test_equal_limits_fix_a_joint(tmp_path):
+    text = ARM.replace('lower="0.1" upper="0.3"', 'lower="0.3" upper="0.3"')
+    p = read(tmp_path, text).prepare(coordinates="joint")
+    assert p.names == ("shoulder.angle",)
+    np.testing.assert_allclose(p.pose("tool", [0.0])[0], (0.9, 0.1, 0.4), atol=1e-14)

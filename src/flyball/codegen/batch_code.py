@@ -8,6 +8,7 @@ Microsystems, 1993).
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
@@ -28,8 +29,18 @@ from ..engine.batch_dynamics import (
 )
 from ..engine.entry_point import zero_work
 from ..engine.recursive_dynamics import VelocityPaths, factor_mass_matrix, solve_mass_matrix, tree_dynamics
+from ..errors import PerformanceNotice, warn_user
 from ..expression_graph.graph import Graph, Node
-from ..expression_graph.printers.llvm import Lines, Module, Place, Procedure, constant, ordered_operations
+from ..expression_graph.printers.llvm import (
+    INFIX,
+    Lines,
+    Module,
+    Place,
+    Procedure,
+    UnsupportedOperation,
+    constant,
+    ordered_operations,
+)
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, named_arrays
 from .machine_code import target_description
@@ -40,9 +51,12 @@ TASKS = (INVERSE_DYNAMICS, MASS_MATRIX, FORWARD_DYNAMICS, INVERSE_DERIVATIVES, F
 """Tasks of `engine.batch_dynamics` that code is generated for."""
 MAX_OPERATIONS = 120_000
 """Operations up to which code is generated: LLVM needs about a minute for these."""
+SECONDS_PER_SQUARE = 7e-9
+"""Seconds of compiling per operation squared, measured at 20,000 to 50,000 operations."""
 LARGEST_ANGLE = 1e5
-"""Angles [rad] up to which the reduction of arguments is exact enough; larger ones are left to the general kernel."""
+"""Angles [rad] up to which the reduction of arguments is exact enough; those of larger ones are not a number."""
 VECTOR = f"<{LANES} x double>"
+PAIR = f"{{ {VECTOR}, {VECTOR} }}"
 FACTOR = "factor"
 """Base whose entries are vectors: the factor of the mass matrix."""
 BASES = ("q", "v", "given", "first", "second", "third")
@@ -61,7 +75,7 @@ class BatchCode:
         """A call with these arrays: it returns the number of states before the first that fails, or its block."""
         padded = (*states, *[states[0]] * (3 - len(states)), *results, *[results[0]] * (3 - len(results)))
         call = partial(self._call, *[x.ctypes.data for x in padded], len(states[0]))
-        call.arrays = padded  # type: ignore[attr-defined]  # kept in memory as long as the call is
+        call.in_memory = (self, padded)  # type: ignore[attr-defined]  # code and arrays, as long as the call exists
         return call
 
 
@@ -94,8 +108,13 @@ class ForwardDerivativesCode:
 def batch_code(s: Structure, S: System, V: VelocityPaths, task: int) -> BatchCode | ForwardDerivativesCode | None:
     """Code of a task, from disk or generated now; None if the mechanism is too large."""
     if task == FORWARD_DERIVATIVES:
-        parts = [_single_code(s, S, V, part) for part in (FORWARD_DYNAMICS, INVERSE_DERIVATIVES, task)]
-        return None if None in parts else ForwardDerivativesCode(*parts)  # type: ignore[arg-type]
+        parts = []
+        for part in (FORWARD_DYNAMICS, INVERSE_DERIVATIVES, task):
+            code = _single_code(s, S, V, part)
+            if code is None:
+                return None
+            parts.append(code)
+        return ForwardDerivativesCode(*parts)
     return _single_code(s, S, V, task)
 
 
@@ -105,14 +124,16 @@ def _single_code(s: Structure, S: System, V: VelocityPaths, task: int) -> BatchC
         path = folder / f"batch-{_key(S, task)}.o"
         if (code := read_object(path)) is not None:
             mark_used(path)
-            return BatchCode(code)
+            with contextlib.suppress(RuntimeError):  # LLVM's error for code of another machine
+                return BatchCode(code)
     text = solver_text(V) if task == FORWARD_DERIVATIVES else batch_text(s, S, V, task)
     if text is None:
         return None
     code = object_code_of_text(text)
     if path is not None and folder is not None:
-        write_object(path, code)
-        remove_oldest(folder)
+        with contextlib.suppress(OSError):  # a failure costs only time
+            write_object(path, code)
+            remove_oldest(folder)
     return BatchCode(code)
 
 
@@ -160,8 +181,12 @@ def batch_text(s: Structure, S: System, V: VelocityPaths, task: int) -> str | No
               for k, x in enumerate(out.ravel())]  # fmt: skip
     granted, graph.granted = graph.granted, []
     procedure = Procedure("block", reads, stores, 0.0, [([x], what, 1.0) for x, what in granted])
-    if len(ordered_operations(procedure.results, reads)) > MAX_OPERATIONS:
+    operations = len(ordered_operations(procedure.results, reads))
+    if operations > MAX_OPERATIONS:
         return None
+    if (seconds := SECONDS_PER_SQUARE * operations**2) > 2.0:
+        what = f"generating code of recursive dynamics for {s.model.name!r}, once: about {round(seconds)} s"
+        warn_user(what, PerformanceNotice)
     widths |= dict.fromkeys(BASES[3:], s.nv * (s.nv if square else 1))
     module = Module(f"{ARGUMENTS}, i64 %stride", partial(_lane_base, widths), _VectorLines)
     module.add(procedure)
@@ -259,7 +284,7 @@ class _VectorLines(Lines):
 
     def __init__(self, module: Module, reads: Any) -> None:
         super().__init__(module, reads)
-        self.turned: dict[str, str] = {}
+        self.sine_cosine_calls: dict[str, str] = {}
 
     def number(self, x: float) -> str:
         """A number in all lanes."""
@@ -295,11 +320,13 @@ class _VectorLines(Lines):
     def operation(self, x: Node) -> str:
         if x.op in ("sin", "cos"):
             angle = self.name(x.args[0])
-            if angle not in self.turned:
-                self.turned[angle] = self.new(f"call {{ {VECTOR}, {VECTOR} }} @sine_and_cosine({VECTOR} {angle})")
-            return self.new(f"extractvalue {{ {VECTOR}, {VECTOR} }} {self.turned[angle]}, {int(x.op == 'cos')}")
+            if angle not in self.sine_cosine_calls:
+                self.sine_cosine_calls[angle] = self.new(f"call {PAIR} @sine_and_cosine({VECTOR} {angle})")
+            return self.new(f"extractvalue {PAIR} {self.sine_cosine_calls[angle]}, {int(x.op == 'cos')}")
         if x.op == "sqrt":
             return self.new(f"call {VECTOR} @llvm.sqrt.v{LANES}f64({VECTOR} {self.name(x.args[0])})")
+        if x.op not in INFIX:
+            raise UnsupportedOperation(x.op)
         return super().operation(x)
 
 
@@ -365,13 +392,17 @@ def sine_and_cosine() -> str:
 
     one, three = compared(1.0), compared(3.0)
     odd = new(f"or <{LANES} x i1> {one}, {three}")
-    s, c = where(odd, cosine, sine), where(odd, sine, cosine)
+    near = new(f"fcmp ole {VECTOR} {new(f'call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} %x)')}, {splat(LARGEST_ANGLE)}")
+    not_a_number = f"<{', '.join(['double 0x7FF8000000000000'] * LANES)}>"
+    s, c = (where(near, a, not_a_number) for a in (where(odd, cosine, sine), where(odd, sine, cosine)))
     upper = compared(2.0, "oge")
     middle = new(f"or <{LANES} x i1> {one}, {compared(2.0)}")
     s = where(upper, new(f"fneg {VECTOR} {s}"), s)
     c = where(middle, new(f"fneg {VECTOR} {c}"), c)
-    both = f"{{ {VECTOR}, {VECTOR} }}"
-    pair = new(f"insertvalue {both} {new(f'insertvalue {both} poison, {VECTOR} {s}, 0')}, {VECTOR} {c}, 1")
-    declared = "\n".join(f"declare {VECTOR} @llvm.{name}.v{LANES}f64({VECTOR})" for name in ("rint", "floor", "sqrt"))
-    head = f"define internal {both} @sine_and_cosine({VECTOR} %x) nounwind {{"
-    return "\n".join([declared, head, *out, f"  ret {both} {pair}", "}"])
+    sine_only = new(f"insertvalue {PAIR} poison, {VECTOR} {s}, 0")
+    pair = new(f"insertvalue {PAIR} {sine_only}, {VECTOR} {c}, 1")
+    declared = "\n".join(
+        f"declare {VECTOR} @llvm.{name}.v{LANES}f64({VECTOR})" for name in ("rint", "floor", "sqrt", "fabs")
+    )
+    head = f"define internal {PAIR} @sine_and_cosine({VECTOR} %x) nounwind {{"
+    return "\n".join([declared, head, *out, f"  ret {PAIR} {pair}", "}"])

@@ -116,7 +116,7 @@ def _structure(s: Structure, S: System) -> bytes:
 def sources_digest() -> bytes:
     """Hash of all source files of formulas and of the code generator."""
     digest = hashlib.sha256()
-    files: set[Path] = compiled_files()
+    files: set[Path] = compiled_files() | {PACKAGE / "compiler/object_code.py"}
     for folder in ("codegen", "expression_graph"):
         files |= set((PACKAGE / folder).rglob("*.py"))
     for path in sorted(files):

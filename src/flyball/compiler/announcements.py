@@ -25,6 +25,7 @@ COSTS: dict[str, tuple[str, float]] = {
     "explicit_steps": ("explicit methods", 2.1),
     "variation_kernel": ("sensitivities of motions", 4.5),
     "record_motion_kernel": ("energies and errors of motions", 1.1),
+    "batch_kernel": ("recursive dynamics", 5.0),
     "between": ("contact of all shapes", 9.0),
     "between_convex": ("contact of convex shapes", 2.3),
     "between_planar": ("contact in the plane", 1.3),

@@ -59,13 +59,16 @@ class BatchArrays(NamedTuple):
     first: Float3  # (k, ...)
     second: Float3
     third: Float3
+    singular: Int1  # (1,): where the task failed, the velocity that moves no inertia
 
 
 @kernel
 def batch_kernel(S: System, W: Work, V: VelocityPaths, D: TreeDynamics, batch: BatchArrays, task: int) -> int:
     """Perform a task at every state. Returns the number of states that succeeded before the first that did not."""
     for i in range(batch.q.shape[0]):
-        if perform_at_state(S, W, V, D, batch, i, task) != 0:
+        status = perform_at_state(S, W, V, D, batch, i, task)
+        if status != 0:
+            batch.singular[0] = status - 1
             return i
     return int(batch.q.shape[0])
 

@@ -171,8 +171,8 @@ def place_bodies(S, W, D, q):
 
 
 @formula
-def move_body(S, V, D, b, v, vdot):
-    """Velocity and acceleration of body b, from its parent's."""
+def parent_motion(S, D, b):
+    """Velocity and acceleration of the parent of body b; of ground 0 and -g."""
     a = S.tree.parent[b]
     o = 0.0 * D.point[b, 0]
     zero = (o, o, o)
@@ -180,6 +180,13 @@ def move_body(S, V, D, b, v, vdot):
     acceleration = (zero, (o - S.gravity[0], o - S.gravity[1], o - S.gravity[2]))
     if a >= 0:
         velocity, acceleration = load6(D.velocity, a), load6(D.acceleration, a)
+    return velocity, acceleration
+
+
+@formula
+def move_body(S, V, D, b, v, vdot):
+    """Velocity and acceleration of body b, from its parent's."""
+    velocity, acceleration = parent_motion(S, D, b)
     v0 = S.tree.v[b]
     for d in range(v0, v0 + S.tree.nv[b]):
         velocity = add6(velocity, scale6(v[d], load6(D.column, d)))
@@ -374,13 +381,7 @@ def coriolis_transposed(D, b, column):
 def displacement_terms(S, V, D, v, vdot):
     """Store psi, chi and phi of every velocity, at the velocities and accelerations in D."""
     for b in range(S.tree.parent.shape[0]):
-        a = S.tree.parent[b]
-        o = 0.0 * D.point[b, 0]
-        zero = (o, o, o)
-        vbar = (zero, zero)
-        abar = (zero, (o - S.gravity[0], o - S.gravity[1], o - S.gravity[2]))
-        if a >= 0:
-            vbar, abar = load6(D.velocity, a), load6(D.acceleration, a)
+        vbar, abar = parent_motion(S, D, b)
         v0 = S.tree.v[b]
         for d in range(v0, v0 + S.tree.nv[b]):
             if V.along_world[d] == 1:
@@ -413,20 +414,20 @@ def newton_euler_derivatives(S, W, V, D, v, vdot, by_position, by_velocity):
         column, psi, chi, phi = load6(D.column, d), load6(D.psi, d), load6(D.chi, d), load6(D.phi, d)
         inertia = load_inertia(D, b)
         displaced = add6(inertia_times(inertia, chi), coriolis_times(D, b, psi[0]))
-        turned = add6(displaced, cross_force(column, load6(D.force, b)))
+        with_force = add6(displaced, cross_force(column, load6(D.force, b)))
         moved = add6(inertia_times(inertia, phi), coriolis_times(D, b, column[0]))
         for e in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
             other = load6(D.column, e)
-            by_position[e, d] = dot6(other, turned) if V.along_world[e] == 1 else dot6(other, displaced)
+            by_position[e, d] = dot6(other, with_force) if V.along_world[e] == 1 else dot6(other, displaced)
             by_velocity[e, d] = dot6(other, moved)
-        momentum, bent = inertia_times(inertia, column), coriolis_transposed(D, b, column)
+        momentum, coriolis = inertia_times(inertia, column), coriolis_transposed(D, b, column)
         e = V.previous[S.tree.v[b]]
         while e >= 0:
             other = load6(D.column, e)
-            by_position[e, d] = dot6(other, turned)
+            by_position[e, d] = dot6(other, with_force)
             by_velocity[e, d] = dot6(other, moved)
-            by_position[d, e] = dot6(load6(D.chi, e), momentum) + dot(load3(D.psi, e, 0), bent)
-            by_velocity[d, e] = dot6(load6(D.phi, e), momentum) + dot(other[0], bent)
+            by_position[d, e] = dot6(load6(D.chi, e), momentum) + dot(load3(D.psi, e, 0), coriolis)
+            by_velocity[d, e] = dot6(load6(D.phi, e), momentum) + dot(other[0], coriolis)
             e = V.previous[e]
 
 

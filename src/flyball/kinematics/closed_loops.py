@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Array = np.ndarray
 RANK = 1e-9
 """Singular values, relative to the largest, up to which rows count as dependent; rows have unit length before."""
+INCONSISTENT = 1e-6
+"""Residual of constraints or forces, relative to the largest of the state, that counts as a contradiction."""
 OFF_CONSTRAINTS = 1e-6
 """Violation of the constraints, in lengths of the mechanism or radians, from which on a state is refused."""
 
@@ -114,16 +116,23 @@ class ClosedLoops:
         rows = self.constraints(q, v)
         G, norms = self._unit_rows(rows)
         M, free = self.mass_matrix(q), tau - self.bias_forces(q, v)
-        L = np.linalg.cholesky(M)
+        try:
+            L = np.linalg.cholesky(M)
+        except np.linalg.LinAlgError:
+            values = np.linalg.eigvalsh(M)[:, 0]
+            raise AnalysisError(
+                f"{self._name!r}: the mass matrix of the tree is singular at state {int(np.argmin(values))}; give the "
+                f"bodies mass and inertia, or use p.acceleration"
+            ) from None
         a = np.linalg.solve(M, free[..., None])
         X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
-        left = (rows.gamma / norms)[..., None] - G @ a
-        y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ left
+        residual = (rows.gamma / norms)[..., None] - G @ a
+        y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ residual
         a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
         lam = np.linalg.pinv(X, rcond=RANK) @ y
         return a[..., 0], lam[..., 0] / norms
 
-    def drive_forces(self, forces: Array, q: Array, v: Array, drives: Sequence[str]) -> Array:
+    def drive_forces(self, forces: Array, q: Array, v: Array, a: Array, drives: Sequence[str]) -> Array:
         """Forces (k, drives) along the drives that replace generalised forces (k, nv) of the tree.
 
         S^T u + G^T lam = forces.
@@ -131,18 +140,24 @@ class ClosedLoops:
         Raises
         ------
         AnalysisError
-            If the drives cannot make them, or share them with the loops or each other.
+            If the drives cannot produce these forces, their forces are not unique, or the accelerations a do not
+            satisfy the constraints.
         """
-        at = self._places(drives)
-        G, _ = self._unit_rows(self.constraints(q, v))
-        k, n = len(q), len(at)
-        S = np.zeros((k, n, len(self.names)))
-        S[:, np.arange(n), at] = 1.0
-        both = np.concatenate([S, G], axis=1)
-        self._refuse_undetermined(both, G, drives)
+        rows = self.constraints(q, v)
+        both, G, norms = self._with_rows(rows, drives)
+        gamma = rows.gamma / norms
+        off = np.abs((G @ a[..., None])[..., 0] - gamma).max(axis=1, initial=0.0)
+        terms = (np.abs(G) @ np.abs(a)[..., None])[..., 0] + np.abs(gamma)
+        if (off > INCONSISTENT * terms.max(axis=1, initial=0.0)).any():
+            raise AnalysisError(
+                f"the accelerations do not satisfy the constraints of {self._name!r} at state {int(np.argmax(off))}: "
+                "with B and c of dependent_velocities they are B wdot + c"
+            )
+        n, sizes = len(drives), self.dynamics.compiled.sizes
         solved = np.linalg.pinv(np.swapaxes(both, 1, 2), rcond=RANK) @ forces[..., None]
-        left = np.abs(np.swapaxes(both, 1, 2) @ solved - forces[..., None]).max(initial=0.0)
-        if left > 1e-6 * np.abs(forces).max(initial=np.finfo(float).tiny):
+        work = (np.swapaxes(both, 1, 2) @ solved - forces[..., None])[..., 0] * sizes
+        largest = np.abs(forces * sizes).max(axis=1, initial=0.0)
+        if (np.abs(work).max(axis=1, initial=0.0) > INCONSISTENT * largest).any():
             raise AnalysisError(
                 f"the drives {', '.join(drives)} of {self._name!r} cannot give these accelerations: it has more "
                 "freedoms"
@@ -157,15 +172,9 @@ class ClosedLoops:
         AnalysisError
             If they do not determine all velocities, or are not independent.
         """
-        at = self._places(independent)
-        rows = self.constraints(q, v)
-        G, norms = self._unit_rows(rows)
-        k, f = len(q), len(at)
-        S = np.zeros((k, f, len(self.names)))
-        S[:, np.arange(f), at] = 1.0
-        both = np.concatenate([S, G], axis=1)
-        self._refuse_undetermined(both, G, independent)
-        values = np.linalg.matrix_rank(both, rtol=RANK) if len(self.names) else np.zeros(k)
+        rows, f = self.constraints(q, v), len(independent)
+        both, _, norms = self._with_rows(rows, independent)
+        values = np.linalg.matrix_rank(both, rtol=RANK)
         if (values < len(self.names)).any():
             raise AnalysisError(
                 f"{', '.join(independent)} do not determine all velocities of {self._name!r} at state "
@@ -175,16 +184,28 @@ class ClosedLoops:
         c = inverse[..., f:] @ (rows.gamma / norms)[..., None]
         return inverse[..., :f], c[..., 0]
 
-    def _refuse_undetermined(self, both: Array, G: Array, names: Sequence[str]) -> None:
-        """Refuse velocities that are not independent of each other and of the rows."""
-        added = np.linalg.matrix_rank(both, rtol=RANK) - np.linalg.matrix_rank(G, rtol=RANK)
-        if (added < len(names)).any():
-            raise AnalysisError(
-                f"{', '.join(names)} are not independent in {self._name!r} at state {int(np.argmin(added))}: name "
-                f"{int(added.min())} velocities there"
-            )
+    def _with_rows(self, rows: Constraints, names: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Rows that select velocities, above the constraint rows of unit length; these rows, and their norms.
 
-    def _places(self, names: Sequence[str]) -> list[int]:
+        Raises
+        ------
+        AnalysisError
+            If the velocities are not independent of each other and of the constraint rows.
+        """
+        at = self._velocity_indices(names)
+        G, norms = self._unit_rows(rows)
+        selection = np.zeros((len(G), len(at), len(self.names)))
+        selection[:, np.arange(len(at)), at] = 1.0
+        both = np.concatenate([selection, G], axis=1)
+        added = np.linalg.matrix_rank(both, rtol=RANK) - np.linalg.matrix_rank(G, rtol=RANK)
+        if (added < len(at)).any():
+            raise AnalysisError(
+                f"{', '.join(names)} are not independent in {self._name!r} at state {int(np.argmin(added))}: only "
+                f"{int(added.min())} of them are"
+            )
+        return both, G, norms
+
+    def _velocity_indices(self, names: Sequence[str]) -> list[int]:
         if isinstance(names, str) or not names:
             raise ModelError(f"give a list of names of velocities, such as [{self.names[0]!r}], not {names!r}")
         for name in names:

@@ -48,8 +48,8 @@ class InverseKinematics:
     singular : ndarray of bool, (m,)
         Whether some motion of the frame is impossible there that is possible nearby: the Jacobian loses rank.
     freedoms : int
-        Motions of the mechanism that leave the frame where it is (of the first configuration). If there are some, the
-        solutions form a continuum, and ``q`` has some of them.
+        Motions of the mechanism that leave the frame where it is, but for singular configurations. If there are some,
+        the solutions form a continuum, and ``q`` has some of them.
     """
 
     frame: str
@@ -87,11 +87,16 @@ class _Target(NamedTuple):
 
 
 class _Starts(NamedTuple):
-    """Configurations to begin from, and the range of each coordinate."""
+    """Configurations to begin from, and properties of the entries of q [(nq,)]."""
 
     q: Array
     lower: Array
     upper: Array
+    turn: Array  # 2 pi for angles without stops, else infinite
+    units: Array  # the mechanism's length, or a radian
+    sizes: Array  # (nv,): the same of the velocities
+    entry: Array  # (nv,): see `PoseRequest`
+    quaternions: list[int]  # first entry of each
 
 
 class PoseRequest(NamedTuple):
@@ -104,6 +109,7 @@ class PoseRequest(NamedTuple):
     starts: int
     seed: int
     sizes: Array  # (nv,): the mechanism's length, or a radian
+    entry: Array  # (nv,): the entry of q whose rate each velocity is; -1: of a quaternion
     drawn: Array  # (nv,): values of the coordinates where q is zero
     length: float
 
@@ -131,7 +137,7 @@ def inverse_kinematics(p: Prepared, request: PoseRequest) -> InverseKinematics:
             f"the nearest found misses it by {shift:.4g} m and {np.degrees(turn):.4g} deg. It may be out of reach or "
             f"beyond stops; more starts= search farther"
         )
-    return _distinct(p, target, q[good], begin, request.sizes)
+    return _distinct(p, target, q[good], begin)
 
 
 def _target(p: Prepared, request: PoseRequest) -> _Target:
@@ -165,16 +171,25 @@ def _ranges(p: Prepared, drawn: Array) -> tuple[Array, Array]:
 
 
 def _starts(p: Prepared, request: PoseRequest) -> _Starts:
-    """The wanted configuration, and random ones: angles anywhere, lengths about it as far as the mechanism's length."""
-    first, sizes = request.near, request.sizes
-    lower, upper = _ranges(p, request.drawn)
+    """The wanted configuration, and random ones: angles anywhere, lengths as far as the mechanism's length."""
+    first, sizes, n = request.near, request.sizes, len(p.q)
+    plain = request.entry >= 0
+    at = request.entry[plain]
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    lower[at], upper[at] = (x[plain] for x in _ranges(p, request.drawn))
     angles = _is_rotation(p)
-    low = np.where(np.isfinite(lower), lower, np.where(angles, -np.pi, -sizes))
-    high = np.where(np.isfinite(upper), upper, np.where(angles, np.pi, sizes))
-    shifts = np.random.default_rng(request.seed).uniform(low, np.maximum(low, high), (request.starts - 1, len(low)))
-    plain = len(p.q) == len(p.v)
-    others = shifts if plain else np.array([p.step(first, d) for d in shifts]).reshape(-1, len(p.q))
-    return _Starts(np.concatenate([first[None], others]), lower, upper)
+    turn, units = np.full(n, np.inf), np.ones(n)
+    units[at] = sizes[plain]
+    turn[at] = np.where(angles[plain] & np.isinf(lower[at]) & np.isinf(upper[at]), 2.0 * np.pi, np.inf)
+    low, high = (np.where(angles, sign * np.pi, sign * sizes) for sign in (-1.0, 1.0))
+    low[plain] = np.where(np.isfinite(lower[at]), lower[at], low[plain])
+    high[plain] = np.where(np.isfinite(upper[at]), upper[at], high[plain])
+    values = np.random.default_rng(request.seed).uniform(low, np.maximum(low, high), (request.starts - 1, len(low)))
+    values[:, plain] -= first[at]
+    others = np.array([p.step(first, d) for d in values]).reshape(-1, n)
+    taken = set(at.tolist())
+    quaternions = [k for k in range(n) if k not in taken][::4]
+    return _Starts(np.concatenate([first[None], others]), lower, upper, turn, units, sizes, request.entry, quaternions)
 
 
 def _is_rotation(p: Prepared) -> Array:
@@ -204,9 +219,8 @@ def _jacobian(p: Prepared, t: _Target, q: Array) -> Array:
 
 def _moved(p: Prepared, begin: _Starts, q: Array, d: Array) -> Array:
     """Configurations moved along the velocities, as far as stops permit."""
-    if q.shape[1] != d.shape[1]:
-        return np.array([p.step(a, b) for a, b in zip(q, d, strict=True)])
-    return np.clip(q + d, begin.lower, begin.upper)
+    moved = np.array([p.step(a, b) for a, b in zip(q, d, strict=True)]) if begin.quaternions else q + d
+    return np.clip(moved, begin.lower, begin.upper)
 
 
 def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
@@ -218,15 +232,18 @@ def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
         active = np.flatnonzero((np.linalg.norm(error, axis=1) > ROUNDING) & (damping < MAX_DAMPING))
         if not len(active):
             break
-        J = _jacobian(p, t, q[active])
+        J = _jacobian(p, t, q[active]) * begin.sizes
         A, b = np.swapaxes(J, 1, 2) @ J, np.einsum("kij,ki->kj", J, error[active])
-        if q.shape[1] == b.shape[1]:  # a coordinate at a stop that would go beyond it stays
-            held = ((q[active] <= begin.lower) & (b < 0.0)) | ((q[active] >= begin.upper) & (b > 0.0))
-            b = np.where(held, 0.0, b)
-            A = np.where(held[:, :, None] | held[:, None, :], 0.0, A)
+        at_stop = np.zeros(b.shape, bool)  # a coordinate at a stop that would go beyond it stays
+        plain = begin.entry >= 0
+        x, way = q[active][:, begin.entry[plain]], b[:, plain]
+        bounds = (y[begin.entry[plain]] for y in (begin.lower, begin.upper))
+        at_stop[:, plain] = ((x <= next(bounds)) & (way < 0.0)) | ((x >= next(bounds)) & (way > 0.0))
+        b = np.where(at_stop, 0.0, b)
+        A = np.where(at_stop[:, :, None] | at_stop[:, None, :], 0.0, A)
         largest = np.maximum(np.einsum("kii->ki", A).max(axis=1), np.finfo(float).tiny)
         A = A + (damping[active] * largest)[:, None, None] * np.eye(A.shape[1])
-        step = np.linalg.solve(A, b[..., None])[..., 0]
+        step = begin.sizes * np.linalg.solve(A, b[..., None])[..., 0]
         tried = _moved(p, begin, q[active], step)
         found = _pose_error(p, t, tried)
         better = np.linalg.norm(found, axis=1) < np.linalg.norm(error[active], axis=1)
@@ -237,16 +254,15 @@ def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
     return q, error
 
 
-def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts, sizes: Array) -> InverseKinematics:
+def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinematics:
     """Different solutions, the nearest to the first start first; unlimited angles within half a turn of it."""
-    first = begin.q[0]
-    turn, units = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
-    if q.shape[1] == len(p.v):
-        turn[_is_rotation(p) & ~np.isfinite(begin.lower) & ~np.isfinite(begin.upper)] = 2.0 * np.pi
-        units = sizes
+    first, units = begin.q[0], begin.units
+    for k in begin.quaternions:  # of the two that are the same rotation, the one near the first
+        flipped = q[:, k : k + 4] @ first[k : k + 4] < 0.0
+        q[flipped, k : k + 4] *= -1.0
 
     def difference(a: Array, b: Array) -> Array:
-        return a - b - np.where(np.isfinite(turn), turn * np.round((a - b) / turn), 0.0)
+        return a - b - np.where(np.isfinite(begin.turn), begin.turn * np.round((a - b) / begin.turn), 0.0)
 
     q = first + difference(q, first)
     order = np.argsort(np.abs((q - first) / units).max(axis=1), kind="stable")
@@ -255,7 +271,7 @@ def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts, sizes: Array) -
         if all(np.abs(difference(q[k], q[i]) / units).max() > DISTINCT for i in found):
             found.append(k)
     q = q[found]
-    values = np.linalg.svd(_jacobian(p, t, q), compute_uv=False)
+    values = np.linalg.svd(_jacobian(p, t, q) * begin.sizes, compute_uv=False)
     rank = (values > SINGULAR * values[:, :1]).sum(axis=1)
     full = min(len(t.rows), len(p.v))
-    return InverseKinematics(t.frame, q, _errors(p, t, q), rank < full, len(p.v) - int(rank[0]))
+    return InverseKinematics(t.frame, q, _errors(p, t, q), rank < full, len(p.v) - int(rank.max()))

@@ -211,7 +211,8 @@ class Prepared(RecursiveMethods):
         x = self._recursive
         first = self.q if near is None else self._states((near,))[0][0][0]
         length, drawn = float(x.system.scales.length), x.system.bodies.offset[x.paths.body]
-        request = PoseRequest(frame, position, rotation, first, starts, seed, x.compiled.sizes, drawn, length)
+        sizes = x.compiled.sizes
+        request = PoseRequest(frame, position, rotation, first, starts, seed, sizes, x.entries, drawn, length)
         return inverse_kinematics(self, request)
 
     def __getstate__(self) -> dict[str, Any]:

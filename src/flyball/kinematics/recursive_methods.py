@@ -112,7 +112,7 @@ class OneState:
         self.quaternions, self.largest = x.quaternions, LARGEST_ANGLE if code is not None else math.inf
 
     def evaluate(self, given: Sequence[Array]) -> bool:
-        """Evaluate; False if the arguments or the result are not ordinary, and `RecursiveMethods` must look closer."""
+        """Evaluate; return False if the arguments need the checked path."""
         total = 0.0
         for mine, x in zip(self.states, given, strict=True):
             mine[0] = x
@@ -153,6 +153,16 @@ class BatchDynamics:
             for b in np.flatnonzero((S.tree.joint == FREE) | (S.tree.joint == SPHERICAL)).tolist()
         ]
         self._thread = threading.local()
+        self._lock = threading.Lock()
+
+    @property
+    def entries(self) -> Array:
+        """The entry of q whose rate each velocity is, (nv,); -1 of those of quaternions."""
+        tree, body = self.system.tree, self.paths.body
+        number = np.arange(len(body)) - tree.v[body]
+        kind = tree.joint[body]
+        turning = (kind == SPHERICAL) | ((kind == FREE) & (number >= 3))
+        return np.where(turning, -1, tree.q[body] + number)
 
     @property
     def workspace(self) -> _Workspace:
@@ -181,17 +191,17 @@ class BatchDynamics:
         """Machine code generated for this mechanism; None if none is wanted, or possible."""
         if not self._specialize or task not in TASKS:
             return None
-        if task not in self._code:
-            self._code[task] = batch_code(self.structure, self.system, self.paths, task)
-        return self._code[task]
+        with self._lock:
+            if task not in self._code:
+                self._code[task] = batch_code(self.structure, self.system, self.paths, task)
+            return self._code[task]
 
     def evaluate(
         self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody, threads: int
     ) -> None:
         """Evaluate at all states (k, n), into results (k, rows, columns)."""
         code = self.code(task)
-        if code is not None and np.abs(states[0]).max(initial=0.0) > LARGEST_ANGLE:
-            code = None
+        far = np.abs(states[0]).max(axis=1, initial=0.0) > LARGEST_ANGLE if code is not None else np.zeros(0, bool)
 
         def part(begin: int, end: int) -> int:
             """Evaluate some states; returns the first at which that failed, or ``end``."""
@@ -200,6 +210,10 @@ class BatchDynamics:
             if done < len(mine[0]):  # also to find the state that fails among those of a block
                 rest = _batch_arrays([x[done:] for x in mine], [x[done:] for x in out], frame)
                 done += self.workspace.bound(rest)(task)
+            for i in np.flatnonzero(far[begin : begin + done]).tolist():
+                one = _batch_arrays([x[i : i + 1] for x in mine], [x[i : i + 1] for x in out], frame)
+                if self.workspace.bound(one)(task) == 0:
+                    return begin + i
             return begin + done
 
         ends = np.linspace(0, len(states[0]), threads + 1).astype(int).tolist()
@@ -210,17 +224,17 @@ class BatchDynamics:
                 failed = list(pool.map(part, ends[:-1], ends[1:]))
         for i, end in zip(failed, ends[1:], strict=True):
             if i < end:
-                self.refuse(i, states)
+                self.raise_singular(i, states)
 
-    def refuse(self, i: int, states: Sequence[Array]) -> None:
+    def raise_singular(self, i: int, states: Sequence[Array]) -> None:
         """Raise the error of a state at which the accelerations are not determined."""
-        inertia = np.zeros((1, len(self.names), len(self.names)))
-        self.workspace.bound(_batch_arrays([x[i : i + 1] for x in states], [inertia], _NO_FRAME))(MASS_MATRIX)
-        d = int(np.argmin(np.diagonal(inertia[0])))
+        q, v = (x[i : i + 1] for x in states[:2])
+        arrays = _batch_arrays([q, v, np.zeros_like(v)], [np.zeros((1, 1, v.shape[1]))], _NO_FRAME)
+        self.workspace.bound(arrays)(FORWARD_DYNAMICS)
         raise AnalysisError(
             f"{self.structure.model.name!r}: the accelerations are not determined at state {i}: the mass matrix is "
-            f"singular there; the smallest inertia is {inertia[0, d, d]:.3g}, along {self.names[d]!r}. Give the bodies "
-            f"that it moves mass and inertia"
+            f"singular there; {self.names[int(arrays.singular[0])]!r} moves no inertia that velocities before it do "
+            f"not. Give the bodies that it moves mass and inertia"
         )
 
 
@@ -234,7 +248,8 @@ _NO_FRAME = _frame_on_body(-1, np.zeros(3), np.eye(3))
 def _batch_arrays(states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody) -> BatchArrays:
     padded: list[Array] = [*states, *[states[0][:, :0]] * (3 - len(states))]
     outputs: list[Array] = [*results, *[_NO_COLUMNS] * (3 - len(results))]
-    return BatchArrays(padded[0], padded[1], padded[2], frame, outputs[0], outputs[1], outputs[2])
+    singular = np.zeros(1, np.int64)
+    return BatchArrays(padded[0], padded[1], padded[2], frame, outputs[0], outputs[1], outputs[2], singular)
 
 
 BOUND_METHODS = {
@@ -307,7 +322,8 @@ class RecursiveMethods:
         """
         if drives is not None:
             forces = self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), None, threads)[0]
-            return self._for_states(lambda x, y, f: self._loops.drive_forces(f, x, y, drives), q, v, forces)
+            found = self._for_states(lambda x, y, f, b: self._loops.drive_forces(f, x, y, b, drives), q, v, forces, a)
+            return self._delivered(found, out)
         return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
 
     def bias_forces(self, q: Array, v: Array, *, out: Array | None = None, threads: int = 1) -> Array:
@@ -367,11 +383,10 @@ class RecursiveMethods:
             If a velocity moves no inertia; with closed loops also if a state violates the constraints.
         """
         if self.rows:
+            if threads != 1:
+                raise ModelError("threads are for mechanisms without closed loops; leave them out")
             found = self._for_states(lambda x, y, f: self._loops.forward_dynamics(x, y, f)[0], q, v, tau)
-            if out is None:
-                return found
-            _result_arrays([found.shape], out)[0][:] = found
-            return out
+            return self._delivered(found, out)
         return self._batch(FORWARD_DYNAMICS, (q, v, tau), ((len(self.v),),), out, threads)[0]
 
     def loop_multipliers(self, q: Array, v: Array, tau: Array) -> Array:
@@ -542,7 +557,8 @@ class RecursiveMethods:
         Returns
         -------
         callable
-            Without arguments; it raises AnalysisError where accelerations are not determined. Of one thread at a time.
+            Without arguments; it raises AnalysisError where accelerations are not determined. One thread at a time may
+            call it.
         """
         if method not in BOUND_METHODS:
             raise ModelError(f"{method!r} cannot be bound; choose one of {', '.join(BOUND_METHODS)}")
@@ -554,12 +570,12 @@ class RecursiveMethods:
         if any(not np.shares_memory(mine, theirs) for mine, theirs in zip(given, (q, v, a), strict=True) if mine.size):
             raise ModelError("q, v and a must be arrays of float64 without gaps, each with as many states")
         shape = (n,) if results == 1 else (n, n)
-        arrays = _result_arrays([(*(() if k is None else (k,)), *shape)] * results, out)
-        flat = [r.reshape(len(given[0]), -1, n) for r in arrays]
+        arrays = _result_arrays([(*(() if k is None else (k,)), *shape)] * results, out, given)
+        flat = _in_rows(arrays, len(given[0]), [shape] * results)
         code = x.code(task)
         evaluate: Callable[[], int]
-        if code is None:
-            evaluate = partial(x.workspace.bound(_batch_arrays(given, flat, _NO_FRAME)), task)
+        if code is None:  # with a workspace of its own: other calls may run beside it
+            evaluate = partial(_Workspace(x).bound(_batch_arrays(given, flat, _NO_FRAME)), task)
         else:
             evaluate = code.bound(given, flat)
 
@@ -568,6 +584,14 @@ class RecursiveMethods:
                 x.evaluate(task, given, flat, _NO_FRAME, 1)
 
         return call
+
+    @staticmethod
+    def _delivered(found: Array, out: Array | None) -> Array:
+        """A result, in the array that is wanted."""
+        if out is None:
+            return found
+        _result_arrays([found.shape], out)[0][...] = found
+        return out
 
     def _for_states(self, evaluate: Callable[..., Any], *given: Array, several: bool = False) -> Any:
         """Result of a function of rows (k, n), for one state or many."""
@@ -623,8 +647,8 @@ class RecursiveMethods:
         if not isinstance(threads, int) or threads < 1:
             raise ModelError(f"threads is {threads!r}; it must be a number of threads, 1 or more")
         full = [(*(() if k is None else (k,)), *shape) for shape in shapes]
-        results = _result_arrays(full, out)
-        flat = [r.reshape(len(states[0]), -1, s[-1]) for r, s in zip(results, shapes, strict=True)]
+        results = _result_arrays(full, out, states)
+        flat = _in_rows(results, len(states[0]), shapes)
         x.evaluate(task, states, flat, x.frame(frame) if frame is not None else _NO_FRAME, threads)
         return results
 
@@ -647,7 +671,7 @@ class RecursiveMethods:
     def _states(self, given: Sequence[Any]) -> tuple[list[Array], int | None]:
         """Arguments as arrays of rows, and their number: None for one state."""
         arrays, k = [], None
-        for name, value, n in zip(("q", "v", "a"), given, (len(self.q), len(self.v), len(self.v)), strict=False):
+        for name, value, n in zip(("q", "v", "a or tau", "a"), given, (len(self.q), *[len(self.v)] * 3), strict=False):
             found = np.asarray(value)
             if found.dtype.kind not in "iuf":
                 raise ModelError(f"{name} contains {found.dtype.name} numbers; they must be real")
@@ -676,7 +700,14 @@ class RecursiveMethods:
         return states, k
 
 
-def _result_arrays(shapes: Sequence[tuple[int, ...]], out: Any) -> list[Array]:
+def _in_rows(results: Sequence[Array], k: int, shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+    """Results as arrays (k, rows, columns)."""
+    return [
+        r.reshape(k, shape[0] if len(shape) == 2 else 1, shape[-1]) for r, shape in zip(results, shapes, strict=True)
+    ]
+
+
+def _result_arrays(shapes: Sequence[tuple[int, ...]], out: Any, states: Sequence[Array] = ()) -> list[Array]:
     """Arrays for results: new ones, or those of ``out``, which are checked."""
     if out is None:
         return [np.empty(shape) for shape in shapes]
@@ -685,6 +716,9 @@ def _result_arrays(shapes: Sequence[tuple[int, ...]], out: Any) -> list[Array]:
         fits = isinstance(x, np.ndarray) and x.shape == shape and x.dtype == np.float64 and x.flags.c_contiguous
         if not fits or not x.flags.writeable:
             raise ModelError(f"out must be an array of float64 of the shape {shape}, without gaps and writeable")
+    for k, x in enumerate(given):
+        if any(np.may_share_memory(x, y) for y in (*states, *given[:k])):
+            raise ModelError("out must not overlap the arguments or another result")
     if len(given) != len(shapes):
         raise ModelError(f"out must contain {len(shapes)} arrays, not {len(given)}")
     return given

@@ -1,4 +1,4 @@
-"""Robots described in the formats of other programs: `urdf` reads URDF.
+"""Robots described in the formats of other programs: URDF (`urdf`, `urdf_writer`) and MJCF (`mjcf`).
 
 Imports the model and the elements that a robot is made of; nothing else of flyball imports it but `flyball.load`.
 """

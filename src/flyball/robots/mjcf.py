@@ -204,12 +204,8 @@ class _Reader:
             name = self.name("ACTUATOR", k, f"actuator{k}")
             j = int(M.actuator_trnid[k, 0])
             plain = M.actuator_dyntype[k] == 0 and M.actuator_gaintype[k] == 0 and M.actuator_biastype[k] <= 1
-            if (
-                M.actuator_trntype[k] not in (0, 1)
-                or j not in self.joints
-                or not plain
-                or M.jnt_type[j] not in COORDINATES
-            ):
+            on_joint = M.actuator_trntype[k] in (0, 1) and j in self.joints and M.jnt_type[j] in COORDINATES
+            if not (plain and on_joint):
                 self.unused.append(f"actuator {name}")
                 continue
             gear, gain, bias = float(M.actuator_gear[k, 0]), float(M.actuator_gainprm[k, 0]), M.actuator_biasprm[k]
@@ -250,12 +246,8 @@ class _Reader:
 
     def _report(self) -> None:
         M = self.M
-        for count, what in (
-            (M.ntendon, "tendons"),
-            (M.nsensor, "sensors"),
-            (M.nsite, "sites"),
-            (M.npair, "contact pairs"),
-        ):
+        counts = {"tendons": M.ntendon, "sensors": M.nsensor, "sites": M.nsite, "contact pairs": M.npair}
+        for what, count in counts.items():
             if count:
                 self.unused.append(f"{count} {what}")
         if (M.geom_contype | M.geom_conaffinity).any():

@@ -27,6 +27,7 @@ from ..joints.fixed import Fixed
 from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
+from ..math.rotation import axis_rotation
 from ..model.body import GROUND, Body, Frame, Ground, Initial
 from ..model.element import Element
 from ..model.model import Model
@@ -122,6 +123,7 @@ class _Reader:
         self.robot = self._parsed()
         self.links = self._named("link")
         self.joints = [self._joint(tag) for tag in self._named("joint").values()]
+        self._fix_at_equal_limits()
         self.names: dict[str, str] = {}
         self.unused: dict[str, list[int]] = {}
         self.missing: list[str] = []
@@ -219,6 +221,20 @@ class _Reader:
             self.fail(tag, f"the axis of joint {name!r} is zero")
         return _Joint(name, kind, ends[0], ends[1], self.origin(tag), axis, tag)
 
+    def _fix_at_equal_limits(self) -> None:
+        """Joints whose limits are equal do not move: they are fixed at that value."""
+        for j in self.joints:
+            limit = j.tag.find("limit")
+            if j.kind in ("revolute", "prismatic") and limit is not None:
+                value = self.number(limit, "lower", "0")
+                if value == self.number(limit, "upper", "0"):
+                    axis, shift = j.axis / np.linalg.norm(j.axis), np.eye(4)
+                    if j.kind == "revolute":
+                        shift[:3, :3] = np.array(axis_rotation(axis, value)).reshape(3, 3)
+                    else:
+                        shift[:3, 3] = value * axis
+                    j.origin, j.kind = j.origin @ shift, "fixed"
+
     def root(self) -> str:
         """The link that is no child; refuse joints that form no tree."""
         above: dict[str, _Joint] = {}
@@ -228,12 +244,13 @@ class _Reader:
             above[j.child] = j
         roots = [name for name in self.links if name not in above]
         if len(roots) > 1:
-            self.fail(self.links[roots[1]], f"the links {', '.join(map(repr, roots))} have no parent; one must be")
+            found = ", ".join(map(repr, roots))
+            self.fail(self.links[roots[1]], f"a robot has one link without parent; this one has {found}")
         for j in self.joints:
             met, link = set(), j.child
             while link in above:
                 if link in met:
-                    self.fail(above[link].tag, f"the joints above link {link!r} form a circle")
+                    self.fail(above[link].tag, f"the joints above link {link!r} form a cycle")
                 met.add(link)
                 link = above[link].parent
         if not roots:
@@ -282,7 +299,7 @@ class _Reader:
         inertial = tag.find("inertial")
         shapes = tuple(self._shapes(tag))
         name = self.name(link)
-        mass = 0.0 if inertial is None else self.number(self.child(inertial, "mass"), "value")
+        mass = self._mass(link)
         if mass < 0.0:
             self.fail(inertial, f"the mass of link {link!r} is negative: {mass:g}")
         pose: dict[str, Any] = {"position": tuple(T[:3, 3]), "orientation": rows(T[:3, :3])}
@@ -313,21 +330,22 @@ class _Reader:
             self.fail(inertial if inertial is not None else tag, str(error))
         self.carrier[link] = name
 
+    def _mass(self, link: str) -> float:
+        inertial = self.links[link].find("inertial")
+        return 0.0 if inertial is None else self.number(self.child(inertial, "mass"), "value")
+
     def _physical(self, link: str, tensor: np.ndarray) -> tuple[tuple[float, ...], ...]:
         """Inertia of a link; if no body has it, its smaller principal moments are raised, with a warning."""
         moments, axes = np.linalg.eigh(tensor)
-        lacks = moments[2] - moments[0] - moments[1]
-        if lacks <= ROUNDING * abs(moments[2]):
+        excess = moments[2] - moments[0] - moments[1]
+        if excess <= ROUNDING * abs(moments[2]):
             return rows(tensor)
-        self.raised.append(f"{link} by {0.5 * lacks:.3g} kg m^2")
-        return rows(axes @ np.diag(moments + 0.5 * lacks * np.array([1.0, 1.0, 0.0])) @ axes.T)
+        self.raised.append(f"{link} by {0.5 * excess:.3g} kg m^2")
+        return rows(axes @ np.diag(moments + 0.5 * excess * np.array([1.0, 1.0, 0.0])) @ axes.T)
 
     def _carries_mass(self, link: str, below: dict[str, list[_Joint]]) -> bool:
         """Whether a link beyond this one has mass."""
-        return any(
-            self.links[j.child].find("inertial/mass") is not None or self._carries_mass(j.child, below)
-            for j in below[link]
-        )
+        return any(self._mass(j.child) > 0.0 or self._carries_mass(j.child, below) for j in below[link])
 
     def _connection(self, j: _Joint) -> Iterator[Element]:
         T = self.place[j.child]
@@ -347,6 +365,8 @@ class _Reader:
     def _limits_and_losses(self, j: _Joint) -> Iterator[Element]:
         """Stops, damping and friction of a joint, and an initial value if zero is not permitted."""
         if j.kind not in COORDINATES:
+            if j.kind == "planar" and (j.tag.find("limit") is not None or j.tag.find("dynamics") is not None):
+                self.unused.setdefault("limit and dynamics of a planar joint", []).append(line_of(j.tag))
             return
         name = self.names[j.name]
         along = f"{name}.{COORDINATES[j.kind]}"
@@ -357,9 +377,9 @@ class _Reader:
             lower, upper = self.number(limit, "lower", "0"), self.number(limit, "upper", "0")
             if lower > upper:
                 self.fail(limit, f"the limits of joint {j.name!r} are reversed: {lower:g} to {upper:g}")
-            if lower < upper:
+            if lower < upper:  # equal ends fix the joint: see `_fix_at_equal_limits`
                 yield Limit(self.name(f"{name}_limit"), along, lower=lower, upper=upper)
-            if not lower < 0.0 < upper:
+            if not lower <= 0.0 <= upper:
                 yield Initial(along, value=0.5 * (lower + upper))
         damping, friction = (self.number(losses, x, "0") for x in ("damping", "friction"))
         for value, what in ((damping, "damping"), (friction, "friction")):

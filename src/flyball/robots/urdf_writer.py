@@ -78,7 +78,8 @@ class _Writer:
 
     def text(self) -> str:
         """The file."""
-        if any(t.joint is not None and t.parent == GROUND for t in self.tree):
+        on_ground = any(t.joint is not None and t.parent == GROUND for t in self.tree)
+        if on_ground or any(e.body == GROUND for e in self.model.frames):
             ET.SubElement(self.robot, "link", name="world")
         free = [t.body for t in self.tree if t.joint is None]
         if len(free) + any(t.parent == GROUND and t.joint is not None for t in self.tree) > 1:
@@ -176,8 +177,11 @@ class _Writer:
             if isinstance(c, Coupler) and c.coordinates[0] == along and len(c.coordinates) == 2:
                 n = self.numbers[c.name]
                 a, b = (float(x) for x in n.weights)
-                mimic = {"joint": c.coordinates[1].partition(".")[0], "multiplier": repr(-b / a)}
-                ET.SubElement(joint, "mimic", mimic | {"offset": repr(float(n.value or 0.0) / a)})
+                other, _, what = c.coordinates[1].partition(".")
+                of_other = float(getattr(self.numbers[other], what, 0.0))
+                offset = 0.0 if n.value is None else (float(n.value) - a * drawn - b * of_other) / a
+                mimic = {"joint": other, "multiplier": repr(-b / a), "offset": repr(offset)}
+                ET.SubElement(joint, "mimic", mimic)
                 self.written.add(c.name)
 
     def _limits(self) -> Iterable[Limit]:
@@ -198,8 +202,10 @@ class _Writer:
         total = 0.0
         for e in self.model.forces:
             if type(e) is kind and getattr(e, "coordinate", "") == along:
-                value = getattr(self.numbers[e.name], field)
-                if isinstance(value, (int, float)):
+                n = self.numbers[e.name]
+                value = getattr(n, field)
+                plain = kind is not CoordinateSpring or (n.stiffness == 0.0 and n.force is None)
+                if isinstance(value, (int, float)) and plain:
                     total += float(value)
                     self.written.add(e.name)
         return total

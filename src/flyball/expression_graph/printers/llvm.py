@@ -97,8 +97,8 @@ def parallel_chains(order: Sequence[Node], loaded: Collection[int]) -> dict[int,
     for end in [k for k in behind if k not in follows]:
         chain = behind[end]
         for k, x in enumerate(chain[1:-1], 1):
-            begun = chain[k - PARALLEL_CHAINS] if k >= PARALLEL_CHAINS else None
-            out[x.index] = (begun, [operands(x)[1]])
+            previous = chain[k - PARALLEL_CHAINS] if k >= PARALLEL_CHAINS else None
+            out[x.index] = (previous, [operands(x)[1]])
         if len(chain) > 1:
             others = chain[-1 - PARALLEL_CHAINS : -1]
             out[end] = (None, [*others, operands(chain[-1])[1]])
@@ -363,17 +363,17 @@ class Module:
     def __str__(self) -> str:
         """The text."""
         n = range(len(self.bases))
-        told = ["!0 = distinct !{!0}"] if self.bases else []
+        metadata = ["!0 = distinct !{!0}"] if self.bases else []
         for k in n:
             others = ", ".join(f"!{3 * i + 1}" for i in n if i != k)
-            told += [f"!{3 * k + 1} = distinct !{{!{3 * k + 1}, !0}}", f"!{3 * k + 2} = !{{!{3 * k + 1}}}"]
-            told += [f"!{3 * k + 3} = !{{{others}}}"]
+            metadata += [f"!{3 * k + 1} = distinct !{{!{3 * k + 1}, !0}}", f"!{3 * k + 2} = !{{!{3 * k + 1}}}"]
+            metadata += [f"!{3 * k + 3} = !{{{others}}}"]
         data = []
         for k, numbers in enumerate(self.tables.values()):
             listed = ", ".join(f"double {constant(x)}" for x in numbers)
             data.append(f"@table{k} = internal constant [{len(numbers)} x double] [{listed}]")
         spline = [PIECE_SEARCH] if self.tables else []
-        return "\n\n".join([DECLARATIONS, *data, *spline, *self.texts, "\n".join(told)]) + "\n"
+        return "\n\n".join([DECLARATIONS, *data, *spline, *self.texts, "\n".join(metadata)]) + "\n"
 
 
 class Lines:
