@@ -60,7 +60,7 @@ class Kernel:
         o = {"method": "dop853", "coordinates": "auto", "rtol": RTOL, "atol": None, "max_steps": MOST_STEPS} | options
         self.start = find_initial_state(model.snapshot(), 0.0, None, None, o["coordinates"])
         made = default_integration(o["coordinates"], o["rtol"], o["atol"], o["max_steps"])
-        self.asked = replace(made, method=o["method"]).sized(self.start.base.compiled.values.length)
+        self.asked = replace(made, method=o["method"])
         self.times, self.task = np.linspace(0.0, t_end, outputs), task
 
     def seconds(self) -> float:

@@ -47,7 +47,7 @@ def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, f
     """Iterations, milliseconds, residual [m/s] and force residual of solves cut one after the other."""
     X, W, O, F = allocate_solver(P)
     out = []
-    room = allocate_island_solver(P, O, True) if name in FACTORISING_SOLVERS else F
+    room = allocate_island_solver(P, True) if name in FACTORISING_SOLVERS else F
     F = FactorStorage(room.numbers, room.places)
     solver = SOLVERS[name]
     solver(P, X, W, O, F, 0)
