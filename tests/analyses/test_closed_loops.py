@@ -100,6 +100,8 @@ def test_bad_input():
     zero = np.zeros(len(p.v))
     with pytest.raises(fb.AnalysisError, match=r"state 0 violates the constraints of 'four-bar': 'C: .*' is off by"):
         p.aba(p.q + 0.3, zero, zero)
+    with pytest.raises(fb.AnalysisError, match="the velocities of state 0 violate"):
+        p.aba(p.q, zero + 1.0, zero)
     with pytest.raises(fb.AnalysisError, match="A.angle, B.angle are not independent"):
         p.dependent_velocities(p.q, zero, ["A.angle", "B.angle"])
     with pytest.raises(fb.ModelError, match="'E.angle' is no velocity"):

@@ -65,7 +65,7 @@ def test_two_links():
     assert "2 configurations" in repr(found)
     end = p.inverse_kinematics("tip", ((a + b) * np.cos(0.3), (a + b) * np.sin(0.3)))
     np.testing.assert_allclose(end.q[0], (0.3, 0.0), atol=1e-4)  # the error is of second order there
-    assert end.singular.all()
+    assert end.singular.all() and end.freedoms == 0
     with pytest.raises(fb.NotConverged, match=r"'tip' has this pose, from 100 starts.*misses it by 0.1 m"):
         p.inverse_kinematics("tip", (a + b + 0.1, 0))
     angle = p.inverse_kinematics("B", rotation=1.0)
@@ -117,7 +117,39 @@ def test_bad_input(ur5):
     ):
         with pytest.raises(fb.ModelError, match=match):
             p.inverse_kinematics("link6", **given)
-    closed = ur5.changed({})
-    closed.add(fb.PointOnLine("guide", "ground", "link6", at=(-0.8, 0, 0), axis=(1, 0, 0)))
-    with pytest.raises(fb.AnalysisError, match="constraint equations of guide"):
-        closed.prepare(coordinates="joint").inverse_kinematics("link6", (0, 0, 0))
+    for given in ({"position": ("300 mm", 0, 0)}, {"position": (0, 0, 0), "seed": -1}):
+        with pytest.raises(fb.ModelError):
+            p.inverse_kinematics("link6", **given)
+
+
+def test_closed_loops_stay_closed():
+    """A four-bar whose coupler point is given: both assembly modes, from the law of cosines."""
+    m = fb.Mechanism("four-bar", planar=True)
+    m.add(
+        fb.Body("crank", mass=1, inertia=1, position=(0, 0.1)), fb.Body("coupler", mass=1, inertia=1, position=(0, 0.2))
+    )
+    m.add(fb.Body("rocker", mass=1, inertia=1, position=(0.6, 0)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "coupler", at=(0, 0.2)))
+    m.add(fb.Revolute("C", "coupler", "rocker", at=(0.5, 0.5)), fb.Revolute("D", "ground", "rocker", at=(0.6, 0)))
+    p = m.prepare(coordinates="joint")
+    assert p.rows
+    x, y = 0.2 * np.sin(0.4), 0.2 * np.cos(0.4)  # the crank's end
+    found = p.inverse_kinematics("coupler", (x, y))
+    assert len(found) == 2 and found.freedoms == 0
+    for q in found.q:
+        assert abs(p.constraint(0.0, q)).max() < 1e-9
+        np.testing.assert_allclose(p.pose("coupler", q)[0][:2], (x, y), atol=1e-9)
+
+
+def test_turns_and_stops(ur5):
+    """Stops of a whole turn on either side: solutions differ by more than turns, and the nearest comes first."""
+    m = ur5.changed({})
+    for k in range(1, 7):
+        m.add(fb.Limit(f"stop {k}".replace(" ", "_"), f"J{k}.angle", lower=-2 * np.pi, upper=2 * np.pi))
+    p = m.prepare(coordinates="joint")
+    q = np.random.default_rng(1).uniform(-1.2, 1.2, 6) + (0, 0, 1.4, 0, 1.3, 0)
+    T = denavit_hartenberg(q)[-1]
+    found = p.inverse_kinematics("link6", T[:3, 3], T[:3, :3], near=q)
+    assert len(found) == 8
+    np.testing.assert_allclose(found.q[0], q, atol=1e-8)
+    assert (abs(found.q) <= 2 * np.pi).all()

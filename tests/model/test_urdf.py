@@ -189,6 +189,31 @@ def test_written_and_read_again(tmp_path):
     assert n["a"].shapes()[0].edges == (0.1, 0.2, 0.3)
 
 
+@pytest.mark.parametrize("turn", [(0.3, 0.2, 0.1), (0.3, np.pi / 2, 0.1), (0.1, 1.57079632679, -0.2)])
+def test_orientations_are_written_exactly(tmp_path, turn):
+    """Also where roll and yaw turn about one axis; a root link of the file's own becomes ground again."""
+    text = ARM.replace(
+        'rpy="0 0 1.5707963267948966"/><parent link="slide"',
+        f'rpy="{turn[0]} {turn[1]} {turn[2]}"/><parent link="slide"',
+    )
+    m = read(tmp_path, text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        m.save(tmp_path / "again.urdf")
+        n = fb.load(tmp_path / "again.urdf")
+    q = np.array([0.4, 0.2])
+    (x, R), (y, Q) = (k.prepare(coordinates="joint").pose("tool", q) for k in (m, n))
+    np.testing.assert_allclose(Q, R, atol=1e-15 * 10)
+    np.testing.assert_allclose(y, x, atol=1e-14)
+
+
+def test_names_that_change_are_told(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace('"base"', '"ground"'))
+    with pytest.warns(fb.ModelWarning, match="other names here: ground is ground_, upper-arm is upper_arm"):
+        fb.load(path)
+
+
 def test_what_cannot_be_written(tmp_path):
     m = fb.Mechanism("m")
     m.add(fb.Body("a", mass=1, inertia=(1, 1, 1)), fb.Body("b", mass=1, inertia=(1, 1, 1), position=(1, 0, 0)))
@@ -215,3 +240,7 @@ def test_equal_limits_fix_a_joint(tmp_path):
     p = read(tmp_path, text).prepare(coordinates="joint")
     assert p.names == ("shoulder.angle",)
     np.testing.assert_allclose(p.pose("tool", [0.0])[0], (0.9, 0.1, 0.4), atol=1e-14)
+    p = read(tmp_path, text.replace('lower="-1" upper="2"', 'lower="0.5" upper="0.5"')).prepare(coordinates="joint")
+    assert not len(p.v)
+    along = (np.cos(0.5), 0, -np.sin(0.5))
+    np.testing.assert_allclose(p.pose("tool", [])[0], [0, 0.1, 0.4] + 0.9 * np.array(along), atol=1e-14)

@@ -71,6 +71,12 @@ class ClosedLoops:
         AnalysisError
             If a state violates them, or the mechanism has drivers or curves, whose rows depend on more than the state.
         """
+        arrays = self.rows_at(q, v)
+        self._refuse_inconsistent(arrays, v)
+        return Constraints(arrays.jacobian, arrays.gamma)
+
+    def rows_at(self, q: Array, v: Array) -> ConstraintArrays:
+        """Constraint rows at any states, whether or not they satisfy them."""
         x = self.dynamics
         c, k, nr = x.compiled, len(q), len(self.rows)
         if x.structure.model.drivers or c.has_curves:
@@ -87,14 +93,28 @@ class ClosedLoops:
         clock, output = idle_clock_pool(arrays.y.shape[1]).new(), StructBuffer(OutputBuffer(np.zeros((1, 1))))
         work = pooled_work(x.structure, x.system, np.float64)
         constraint_kernel(engine.address, x.tables, work, idle_tableau(), clock, output, StructBuffer(arrays))
-        off = np.abs(arrays.value) * x.system.row_levers / x.system.scales.length
+        return arrays
+
+    def row_units(self) -> Array:
+        """Factors that divide lengths in values of rows by the mechanism's length, (nr,)."""
+        S = self.dynamics.system
+        return S.row_levers / S.scales.length
+
+    def _refuse_inconsistent(self, arrays: ConstraintArrays, v: Array) -> None:
+        off = np.abs(arrays.value) * self.row_units()
         if off.max(initial=0.0) > OFF_CONSTRAINTS:
             i, row = np.unravel_index(np.argmax(off), off.shape)
             raise AnalysisError(
                 f"state {i} violates the constraints of {self._name!r}: {self.rows[row]!r} is off by "
                 f"{arrays.value[i, row]:.3g}. Recursive dynamics with closed loops needs states that satisfy them"
             )
-        return Constraints(arrays.jacobian, arrays.gamma)
+        G, _ = self._unit_rows(Constraints(arrays.jacobian, arrays.gamma))
+        drift = np.abs((G @ v[..., None])[..., 0]).max(axis=1, initial=0.0)
+        if (drift > OFF_CONSTRAINTS * np.abs(v).max(axis=1, initial=0.0)).any():
+            raise AnalysisError(
+                f"the velocities of state {int(np.argmax(drift))} violate the constraints of {self._name!r}; with B of "
+                "dependent_velocities at zero velocity they are B w"
+            )
 
     @property
     def _name(self) -> str:

@@ -6,12 +6,13 @@ length, orientations are rotation vectors. Coordinates with stops (`Limit`) stay
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError, NotConverged
+from ..errors import ModelError, NotConverged
 from ..forces.limit import Limit
 from ..model.geometry import orientation_matrix, rotation_about, vector
 from ..rotations.arrays import quaternion_of
@@ -84,6 +85,7 @@ class _Target(NamedTuple):
     rotation: Array
     rows: Array
     scale: Array
+    constraints: Callable[[Array], tuple[Array, Array]] | None
 
 
 class _Starts(NamedTuple):
@@ -92,7 +94,7 @@ class _Starts(NamedTuple):
     q: Array
     lower: Array
     upper: Array
-    turn: Array  # 2 pi for angles without stops, else infinite
+    turn: Array  # 2 pi for angles, else infinite
     units: Array  # the mechanism's length, or a radian
     sizes: Array  # (nv,): the same of the velocities
     entry: Array  # (nv,): see `PoseRequest`
@@ -108,6 +110,7 @@ class PoseRequest(NamedTuple):
     near: Array
     starts: int
     seed: int
+    constraints: Callable[[Array], tuple[Array, Array]] | None  # values and Jacobians of rows at q, scaled
     sizes: Array  # (nv,): the mechanism's length, or a radian
     entry: Array  # (nv,): the entry of q whose rate each velocity is; -1: of a quaternion
     drawn: Array  # (nv,): values of the coordinates where q is zero
@@ -117,12 +120,10 @@ class PoseRequest(NamedTuple):
 def inverse_kinematics(p: Prepared, request: PoseRequest) -> InverseKinematics:
     """See `Prepared.inverse_kinematics`."""
     frame, starts = request.frame, request.starts
-    if p.rows:
-        closing = ", ".join(dict.fromkeys(row.partition(":")[0] for row in p.rows))
-        raise AnalysisError(
-            f"inverse_kinematics is for mechanisms whose joints form a tree; in these coordinates {p.model.name!r} has "
-            f"constraint equations of {closing}. Prescribe the frame by Drivers and use m.kinematics"
-        )
+    if not len(p.v):
+        raise ModelError(f"{p.model.name!r} has no freedoms in these coordinates: drivers or joints prescribe it all")
+    if not isinstance(request.seed, int) or request.seed < 0:
+        raise ModelError(f"seed is {request.seed!r}; it must be a whole number, 0 or more")
     if not isinstance(starts, int) or starts < 1:
         raise ModelError(f"starts is {starts!r}; it must be a number of configurations to begin from, 1 or more")
     target = _target(p, request)
@@ -147,15 +148,31 @@ def _target(p: Prepared, request: PoseRequest) -> _Target:
         raise ModelError("inverse_kinematics needs a position, a rotation, or both")
     where, R, rows = np.zeros(3), np.eye(3), list[int]()
     if position is not None:
-        where = np.array(vector(position, planar, "position"), float)
+        where = vector(_real(position, "position"), planar, "position")
         rows += [0, 1] if planar else [0, 1, 2]
     if rotation is not None:
-        R = rotation_about(2, float(rotation)) if planar else orientation_matrix(rotation, "rotation")
+        given = _real(rotation, "rotation")
+        if planar and given.size != 1:
+            raise ModelError(f"rotation: in the plane it is an angle [rad], not {rotation!r}")
+        R = rotation_about(2, float(given)) if planar else orientation_matrix(given, "rotation")
         rows += [5] if planar else [3, 4, 5]
     if not (np.isfinite(where).all() and np.isfinite(R).all()):
         raise ModelError("position and rotation must be finite")
     scale = np.array([1.0 / request.length] * 3 + [1.0] * 3)
-    return _Target(request.frame, where, R, np.array(rows), scale[rows])
+    return _Target(request.frame, where, R, np.array(rows), scale[rows], request.constraints)
+
+
+def _real(value: Any, what: str) -> Array:
+    """An array of numbers.
+
+    Raises
+    ------
+    ModelError
+    """
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise ModelError(f"{what} is {value!r}; it must be numbers, in SI units") from None
 
 
 def _ranges(p: Prepared, drawn: Array) -> tuple[Array, Array]:
@@ -180,7 +197,7 @@ def _starts(p: Prepared, request: PoseRequest) -> _Starts:
     angles = _is_rotation(p)
     turn, units = np.full(n, np.inf), np.ones(n)
     units[at] = sizes[plain]
-    turn[at] = np.where(angles[plain] & np.isinf(lower[at]) & np.isinf(upper[at]), 2.0 * np.pi, np.inf)
+    turn[at] = np.where(angles[plain], 2.0 * np.pi, np.inf)
     low, high = (np.where(angles, sign * np.pi, sign * sizes) for sign in (-1.0, 1.0))
     low[plain] = np.where(np.isfinite(lower[at]), lower[at], low[plain])
     high[plain] = np.where(np.isfinite(upper[at]), upper[at], high[plain])
@@ -204,17 +221,19 @@ def _pose_error(p: Prepared, t: _Target, q: Array) -> Array:
     e = quaternion_of(t.rotation @ np.swapaxes(R, 1, 2))
     s = np.linalg.norm(e[:, 1:], axis=1)
     turn = e[:, 1:] * np.where(s > 0.0, 2.0 * np.arctan2(s, e[:, 0]) / np.where(s > 0.0, s, 1.0), 2.0)[:, None]
-    return np.concatenate([t.position - x, turn], axis=1)[:, t.rows] * t.scale
+    error = np.concatenate([t.position - x, turn], axis=1)[:, t.rows] * t.scale
+    return error if t.constraints is None else np.concatenate([error, -t.constraints(q)[0]], axis=1)
 
 
 def _errors(p: Prepared, t: _Target, q: Array) -> Array:
     """Errors of position [m] and orientation [rad], (k, 2)."""
-    e = _pose_error(p, t, q) / t.scale
+    e = _pose_error(p, t, q)[:, : len(t.rows)] / t.scale
     return np.array([np.linalg.norm(e[:, part], axis=1) for part in (t.rows < 3, t.rows >= 3)]).T
 
 
 def _jacobian(p: Prepared, t: _Target, q: Array) -> Array:
-    return p.frame_jacobian(t.frame, q)[:, t.rows] * t.scale[:, None]
+    J = p.frame_jacobian(t.frame, q)[:, t.rows] * t.scale[:, None]
+    return J if t.constraints is None else np.concatenate([J, t.constraints(q)[1]], axis=1)
 
 
 def _moved(p: Prepared, begin: _Starts, q: Array, d: Array) -> Array:
@@ -255,7 +274,7 @@ def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
 
 
 def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinematics:
-    """Different solutions, the nearest to the first start first; unlimited angles within half a turn of it."""
+    """Different solutions but for whole turns of angles, the nearest to the first start first."""
     first, units = begin.q[0], begin.units
     for k in begin.quaternions:  # of the two that are the same rotation, the one near the first
         flipped = q[:, k : k + 4] @ first[k : k + 4] < 0.0
@@ -265,13 +284,19 @@ def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinem
         return a - b - np.where(np.isfinite(begin.turn), begin.turn * np.round((a - b) / begin.turn), 0.0)
 
     q = first + difference(q, first)
+    whole = np.where(np.isfinite(begin.turn), begin.turn, 1.0)
+    q = q + whole * np.ceil(np.maximum(begin.lower - q, 0.0) / whole)  # back between the stops
+    q = q - whole * np.ceil(np.maximum(q - begin.upper, 0.0) / whole)
     order = np.argsort(np.abs((q - first) / units).max(axis=1), kind="stable")
     found: list[int] = []
     for k in order.tolist():
         if all(np.abs(difference(q[k], q[i]) / units).max() > DISTINCT for i in found):
             found.append(k)
     q = q[found]
+    usual = int(_ranks(p, t, begin, begin.q).max())
+    return InverseKinematics(t.frame, q, _errors(p, t, q), _ranks(p, t, begin, q) < usual, len(p.v) - usual)
+
+
+def _ranks(p: Prepared, t: _Target, begin: _Starts, q: Array) -> Array:
     values = np.linalg.svd(_jacobian(p, t, q) * begin.sizes, compute_uv=False)
-    rank = (values > SINGULAR * values[:, :1]).sum(axis=1)
-    full = min(len(t.rows), len(p.v))
-    return InverseKinematics(t.frame, q, _errors(p, t, q), rank < full, len(p.v) - int(rank.max()))
+    return (values > SINGULAR * values[:, :1]).sum(axis=1)

@@ -165,6 +165,12 @@ class Prepared(RecursiveMethods):
         retract(self._start.compiled.values.system, q, d)
         return q
 
+    def _scaled_rows(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values and Jacobians of constraint rows at many positions, lengths divided by the mechanism's."""
+        loops = self._loops
+        found, units = loops.rows_at(q, np.zeros((len(q), len(self.v)))), loops.row_units()
+        return found.value * units, found.jacobian * units[:, None]
+
     def inverse_kinematics(
         self,
         frame: str,
@@ -178,7 +184,8 @@ class Prepared(RecursiveMethods):
         """Find the configurations at which a frame has a given position and orientation.
 
         By damped least squares from many starts at once: ``near``, and random configurations between the stops. An arm
-        of six joints has up to 16 solutions; with more joints there is a continuum, of which some are found.
+        of six joints has up to 16 solutions but for whole turns of its joints; with more joints there is a continuum,
+        of which some are found. Closed loops are closed in all of them.
 
         Parameters
         ----------
@@ -206,13 +213,14 @@ class Prepared(RecursiveMethods):
         NotConverged
             If none is found; the message says how near the frame came.
         AnalysisError
-            If joints close loops.
+            If there are drivers or curves besides closed loops.
         """
         x = self._recursive
         first = self.q if near is None else self._states((near,))[0][0][0]
         length, drawn = float(x.system.scales.length), x.system.bodies.offset[x.paths.body]
         sizes = x.compiled.sizes
-        request = PoseRequest(frame, position, rotation, first, starts, seed, sizes, x.entries, drawn, length)
+        rows = self._scaled_rows if self.rows else None
+        request = PoseRequest(frame, position, rotation, first, starts, seed, rows, sizes, x.entries, drawn, length)
         return inverse_kinematics(self, request)
 
     def __getstate__(self) -> dict[str, Any]:

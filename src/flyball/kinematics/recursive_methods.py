@@ -564,7 +564,9 @@ class RecursiveMethods:
             raise ModelError(f"{method!r} cannot be bound; choose one of {', '.join(BOUND_METHODS)}")
         task, results = BOUND_METHODS[method]
         if method.startswith("aba"):
-            self._require_tree(method)
+            self._require_tree(f"bind({method!r}, ...)")
+        if out is None:
+            raise ModelError("bind needs arrays for the results, out=")
         n, x = len(self.v), self._recursive
         given, k = self._states((q, v, a))
         if any(not np.shares_memory(mine, theirs) for mine, theirs in zip(given, (q, v, a), strict=True) if mine.size):

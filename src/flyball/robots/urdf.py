@@ -27,9 +27,9 @@ from ..joints.fixed import Fixed
 from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
-from ..math.rotation import axis_rotation
 from ..model.body import GROUND, Body, Frame, Ground, Initial
 from ..model.element import Element
+from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
 from ..model.shapes.box import Box
 from ..model.shapes.cylinder import Cylinder
@@ -39,6 +39,8 @@ from ..model.shapes.sphere import Sphere
 
 T = TypeVar("T", bound=Model)
 
+STANDARD_GRAVITY = 9.80665
+"""Of a robot that is read, along -z [m/s^2]: URDF has none."""
 ROUNDING = 1e-9  # of principal moments, relative to the largest: files round their numbers
 MAX_LISTED = 3  # of lines or files in a warning
 
@@ -128,6 +130,7 @@ class _Reader:
         self.unused: dict[str, list[int]] = {}
         self.missing: list[str] = []
         self.raised: list[str] = []
+        self.renamed: list[str] = []
 
     def fail(self, tag: ET.Element | None, what: str) -> NoReturn:
         """Raise an error that names the file and the line."""
@@ -230,7 +233,9 @@ class _Reader:
                 if value == self.number(limit, "upper", "0"):
                     axis, shift = j.axis / np.linalg.norm(j.axis), np.eye(4)
                     if j.kind == "revolute":
-                        shift[:3, :3] = np.array(axis_rotation(axis, value)).reshape(3, 3)
+                        shift[:3, :3] = quaternion_to_matrix(
+                            np.array([math.cos(value / 2), *(math.sin(value / 2) * axis)])
+                        )
                     else:
                         shift[:3, 3] = value * axis
                     j.origin, j.kind = j.origin @ shift, "fixed"
@@ -260,7 +265,7 @@ class _Reader:
     def mechanism(self, make: Callable[..., T], floating: bool) -> T:
         """The mechanism."""
         root = self.root()
-        m = make(self.robot.get("name") or self.path.stem, gravity=(0, 0, -9.80665))
+        m = make(self.robot.get("name") or self.path.stem, gravity=(0, 0, -STANDARD_GRAVITY))
         below: dict[str, list[_Joint]] = {name: [] for name in self.links}
         for j in self.joints:
             below[j.parent].append(j)
@@ -290,6 +295,8 @@ class _Reader:
         taken = set(self.names.values())
         while plain in taken or plain == GROUND:
             plain += "_"
+        if plain != wanted:
+            self.renamed.append(f"{wanted} is {plain}")
         self.names[f"{wanted} {len(taken)}"] = plain
         return plain
 
@@ -315,6 +322,8 @@ class _Reader:
             place: dict[str, Any] = {"position": tuple(back[:3, 3]), "orientation": rows(back[:3, :3])}
             m.add(Frame(name, rigid, **place))
             self.carrier[link] = rigid
+            if inertial is not None and inertial.find("inertia") is not None:
+                self.unused.setdefault("inertia of a link without mass", []).append(line_of(inertial))
             return
         if mass == 0.0 and rigid is None and not self._carries_mass(link, below):
             self.fail(tag, f"link {link!r} moves, and neither it nor a link beyond it has mass and inertia")
@@ -337,6 +346,11 @@ class _Reader:
     def _physical(self, link: str, tensor: np.ndarray) -> tuple[tuple[float, ...], ...]:
         """Inertia of a link; if no body has it, its smaller principal moments are raised, with a warning."""
         moments, axes = np.linalg.eigh(tensor)
+        if moments[0] < -ROUNDING * abs(moments[2]):
+            values = ", ".join(f"{x:.6g}" for x in moments)
+            self.fail(
+                self.links[link].find("inertial"), f"the inertia of link {link!r} has a negative moment: {values}"
+            )
         excess = moments[2] - moments[0] - moments[1]
         if excess <= ROUNDING * abs(moments[2]):
             return rows(tensor)
@@ -371,6 +385,8 @@ class _Reader:
         name = self.names[j.name]
         along = f"{name}.{COORDINATES[j.kind]}"
         limit, losses = j.tag.find("limit"), j.tag.find("dynamics")
+        if j.kind == "continuous" and limit is not None and {"lower", "upper"} & set(limit.attrib):
+            self.unused.setdefault("limit of a continuous joint", []).append(line_of(limit))
         if j.kind != "continuous":
             if limit is None:
                 self.fail(j.tag, f"joint {j.name!r} of type {j.kind} needs <limit>")
@@ -401,7 +417,9 @@ class _Reader:
                 self.unused.setdefault("mimic of a fixed joint", []).append(line_of(tag))
                 continue
             other = self.attribute(tag, "joint")
-            if kinds.get(other) not in COORDINATES or j.kind not in COORDINATES:
+            if other not in kinds:
+                self.fail(tag, f"joint {j.name!r} follows {other!r}, which does not exist")
+            if kinds[other] not in COORDINATES or j.kind not in COORDINATES:
                 self.fail(tag, f"joint {j.name!r} cannot follow {other!r}: both must be joints with one coordinate")
             factor, offset = self.number(tag, "multiplier", "1"), self.number(tag, "offset", "0")
             ends = [f"{self.names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
@@ -418,18 +436,26 @@ class _Reader:
             geometry = self.child(tag, "geometry")
             given: dict[str, Any] = {"position": tuple(T[:3, 3]), "orientation": rows(T[:3, :3]), "looks": True}
             for x in geometry:
-                if x.tag == "box":
-                    yield Box(edges=tuple(self.numbers(x, "size", None)), **given)
-                elif x.tag == "sphere":
-                    yield Sphere(radius=self.number(x, "radius"), **given)
-                elif x.tag == "cylinder":
-                    yield Cylinder(radius=self.number(x, "radius"), length=self.number(x, "length"), **given)
-                elif x.tag == "mesh" and (file := self._mesh_file(x)) is not None:
-                    scale = self.numbers(x, "scale", "1 1 1")
-                    if np.ptp(scale) != 0.0 or scale[0] <= 0.0:
-                        self.missing.append(f"{file.name} (scaled by {scale})")
-                    else:
-                        yield Mesh(path=str(file), scale=float(scale[0]), **given)
+                try:
+                    if (solid := self._solid(x, given)) is not None:
+                        yield solid
+                except ModelError as error:
+                    self.missing.append(f"<{x.tag}> in line {line_of(x)}: {error}")
+
+    def _solid(self, x: ET.Element, given: dict[str, Any]) -> Solid | None:
+        if x.tag == "box":
+            return Box(edges=tuple(self.numbers(x, "size", None)), **given)
+        if x.tag == "sphere":
+            return Sphere(radius=self.number(x, "radius"), **given)
+        if x.tag == "cylinder":
+            return Cylinder(radius=self.number(x, "radius"), length=self.number(x, "length"), **given)
+        if x.tag != "mesh" or (file := self._mesh_file(x)) is None:
+            return None
+        scale = self.numbers(x, "scale", "1 1 1")
+        if np.ptp(scale) != 0.0 or scale[0] <= 0.0:
+            self.missing.append(f"{file.name} (scaled by {scale})")
+            return None
+        return Mesh(path=str(file), scale=float(scale[0]), **given)
 
     def _mesh_file(self, tag: ET.Element) -> Path | None:
         """The file of a mesh: ``package://name/path`` is looked for in the folders above the model."""
@@ -462,9 +488,14 @@ class _Reader:
         self._note_unused(self.robot)
         parts = [f"<{what}> (line {shortened(lines)})" for what, lines in self.unused.items()]
         if self.missing:
-            parts.append(f"meshes that are not found or not {', '.join(MESH_FORMATS)} ({shortened(self.missing)})")
+            formats = ", ".join(MESH_FORMATS)
+            parts.append(
+                f"shapes that cannot be drawn, or files that are not found or not {formats} ({shortened(self.missing)})"
+            )
         if parts:
             warn_user(f"{self.path.name}: not used: {'; '.join(parts)}", ModelWarning)
+        if self.renamed:
+            warn_user(f"{self.path.name}: other names here: {', '.join(self.renamed)}", ModelWarning)
         if self.raised:
             warn_user(
                 f"{self.path.name}: no body has the inertia of {', '.join(self.raised)}: the largest principal moment "

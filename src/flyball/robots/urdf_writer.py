@@ -36,7 +36,7 @@ from ..tables.element_numbers import element_numbers
 from ..tables.forest import TreeBody, tree_bodies
 from ..tables.structure import structure
 from ..tables.values import values
-from .urdf import COORDINATES
+from .urdf import COORDINATES, STANDARD_GRAVITY
 
 TYPES: dict[type[Joint], str] = {Revolute: "revolute", Prismatic: "prismatic", Fixed: "fixed", Planar: "planar"}
 UNLIMITED = 1e9
@@ -74,13 +74,25 @@ class _Writer:
         self.place: dict[str, np.ndarray] = {GROUND: np.eye(4)}
         self.written: set[str] = {j.name for j in model.joints}
         self.missing: list[str] = []
+        self.ground = self._ground_link()
         self.robot = ET.Element("robot", name=model.name)
+
+    def _ground_link(self) -> str:
+        """Name of the link that is ground: that of a frame at the world's origin, else ``world``."""
+        for e in self.model.frames:
+            p, R = self.poses.named(e.name)
+            if e.body == GROUND and not p.any() and (np.eye(3) == R).all():
+                return e.name
+        name = "world"
+        while self.model.find(name) is not None:
+            name += "_"
+        return name
 
     def text(self) -> str:
         """The file."""
         on_ground = any(t.joint is not None and t.parent == GROUND for t in self.tree)
         if on_ground or any(e.body == GROUND for e in self.model.frames):
-            ET.SubElement(self.robot, "link", name="world")
+            ET.SubElement(self.robot, "link", name=self.ground)
         free = [t.body for t in self.tree if t.joint is None]
         if len(free) + any(t.parent == GROUND and t.joint is not None for t in self.tree) > 1:
             raise ModelError(
@@ -151,7 +163,7 @@ class _Writer:
         if kind == "revolute" and not any(x.coordinate == f"{e.name}.angle" for x in self._limits()):
             kind = "continuous"
         joint = ET.SubElement(self.robot, "joint", name=e.name, type=kind)
-        parent = "world" if t.parent == GROUND else t.parent
+        parent = self.ground if t.parent == GROUND else t.parent
         _origin(joint, np.linalg.inv(self.place[t.parent]) @ self.place[t.body])
         ET.SubElement(joint, "parent", link=parent)
         ET.SubElement(joint, "child", link=t.body)
@@ -212,7 +224,10 @@ class _Writer:
 
     def _fixed_frame(self, e: Any) -> None:
         body = e.body
-        link = "world" if body == GROUND else body
+        link = self.ground if body == GROUND else body
+        self.written.add(e.name)
+        if e.name == self.ground:
+            return
         ET.SubElement(self.robot, "link", name=e.name)
         joint = ET.SubElement(self.robot, "joint", name=f"{e.name}_fixed", type="fixed")
         p, R = self.poses.named(e.name)
@@ -221,10 +236,11 @@ class _Writer:
         _origin(joint, np.linalg.inv(self.place[body]) @ T)
         ET.SubElement(joint, "parent", link=link)
         ET.SubElement(joint, "child", link=e.name)
-        self.written.add(e.name)
 
     def _report(self) -> None:
         rest = [e.title for e in self.model.elements() if e.name not in self.written] + self.missing
+        if tuple(self.model.gravity) != (0, 0, -STANDARD_GRAVITY):
+            rest.append(f"gravity {tuple(self.model.gravity)}")
         if rest:
             warn_user(f"URDF has no counterpart of {', '.join(rest)}; the file lacks them", ModelWarning)
 
@@ -237,8 +253,7 @@ def _origin(tag: ET.Element, T: np.ndarray) -> None:
     """Add an <origin>: position, and roll, pitch and yaw about fixed axes."""
     R = T[:3, :3]
     pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    if np.hypot(R[0, 0], R[1, 0]) > 1e-12:
-        roll, yaw = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
-    else:  # roll and yaw turn about one axis
-        roll, yaw = 0.0, np.arctan2(-R[0, 1], R[1, 1])
+    yaw = np.arctan2(R[1, 0], R[0, 0])  # near a pitch of 90 deg any yaw, with the roll that belongs to it
+    c, s = np.cos(yaw), np.sin(yaw)
+    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
     ET.SubElement(tag, "origin", xyz=_row(T[:3, 3]), rpy=_row((roll, pitch, yaw)))
