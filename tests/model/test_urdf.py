@@ -149,9 +149,16 @@ def test_errors_name_file_line_and_element(tmp_path, change, match):
 def test_an_inertia_that_no_body_has_is_raised(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(ARM.replace('iyy="0.01" iyz="0" izz="0.1"', 'iyy="0.01" iyz="0" izz="0.2"'))
-    with pytest.warns(fb.ModelWarning, match=r"no body has the inertia of upper-arm by 0.045 kg m\^2"):
+    with pytest.warns(
+        fb.ModelWarning, match=r"principal moments of upper-arm \(0.01, 0.1, 0.2 becomes 0.055, 0.145, 0.2 kg m\^2\)"
+    ):
         m = fb.load(path)
     np.testing.assert_allclose(np.linalg.eigvalsh(np.array(m["upper_arm"].inertia)), [0.055, 0.145, 0.2])
+
+
+def test_a_shape_without_extent_is_left_out(tmp_path):
+    m = read(tmp_path, ARM.replace('<box size="0.2 0.2 0.1"/>', '<box size="0 0 0"/>'))
+    assert m.find("base_shape") is None
 
 
 def test_floating_is_for_robots(tmp_path):

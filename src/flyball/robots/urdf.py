@@ -28,7 +28,7 @@ from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
 from ..model.body import GROUND, Body, Frame, Ground, Initial
-from ..model.element import Element
+from ..model.element import Element, resolve
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
 from ..model.shapes.box import Box
@@ -326,7 +326,7 @@ class _Reader:
                 self.unused.setdefault("inertia of a link without mass", []).append(line_of(inertial))
             return
         if mass == 0.0 and rigid is None and not self._carries_mass(link, below):
-            self.fail(tag, f"link {link!r} moves, and neither it nor a link beyond it has mass and inertia")
+            self.fail(tag, f"link {link!r} moves, and neither it nor a link beyond it has mass; give it <inertial>")
         given: dict[str, Any] = {"mass": mass, "inertia": 0.0}
         if inertial is not None and mass > 0.0:
             J, own = self.child(inertial, "inertia"), self.origin(inertial)
@@ -346,16 +346,13 @@ class _Reader:
     def _physical(self, link: str, tensor: np.ndarray) -> tuple[tuple[float, ...], ...]:
         """Inertia of a link; if no body has it, its smaller principal moments are raised, with a warning."""
         moments, axes = np.linalg.eigh(tensor)
-        if moments[0] < -ROUNDING * abs(moments[2]):
-            values = ", ".join(f"{x:.6g}" for x in moments)
-            self.fail(
-                self.links[link].find("inertial"), f"the inertia of link {link!r} has a negative moment: {values}"
-            )
-        excess = moments[2] - moments[0] - moments[1]
-        if excess <= ROUNDING * abs(moments[2]):
+        raised = np.maximum(moments, 0.0)
+        raised[:2] += 0.5 * max(raised[2] - raised[0] - raised[1], 0.0)
+        if np.abs(raised - moments).max() <= ROUNDING * abs(moments[2]):
             return rows(tensor)
-        self.raised.append(f"{link} by {0.5 * excess:.3g} kg m^2")
-        return rows(axes @ np.diag(moments + 0.5 * excess * np.array([1.0, 1.0, 0.0])) @ axes.T)
+        before, after = (", ".join(f"{x:.3g}" for x in y) for y in (moments, raised))
+        self.raised.append(f"{link} ({before} becomes {after} kg m^2)")
+        return rows(axes @ np.diag(raised) @ axes.T)
 
     def _carries_mass(self, link: str, below: dict[str, list[_Joint]]) -> bool:
         """Whether a link beyond this one has mass."""
@@ -438,6 +435,7 @@ class _Reader:
             for x in geometry:
                 try:
                     if (solid := self._solid(x, given)) is not None:
+                        solid.check(resolve(solid, {}))
                         yield solid
                 except ModelError as error:
                     self.missing.append(f"<{x.tag}> in line {line_of(x)}: {error}")
@@ -498,8 +496,8 @@ class _Reader:
             warn_user(f"{self.path.name}: other names here: {', '.join(self.renamed)}", ModelWarning)
         if self.raised:
             warn_user(
-                f"{self.path.name}: no body has the inertia of {', '.join(self.raised)}: the largest principal moment "
-                f"is more than the sum of the others; the two smaller ones were raised by that",
+                f"{self.path.name}: no body has the principal moments of {'; '.join(self.raised)}: none may be "
+                f"negative, or more than the sum of the others; the smaller ones were raised",
                 ModelWarning,
             )
 
