@@ -254,7 +254,7 @@ def test_curves_that_coincide_are_dashed_and_those_of_another_size_apart(opened:
     r = planar()
     wave = np.sin(r.t)
     channels = (Channel("a", "m", wave), Channel("b", "m", wave + 1e-4), Channel("tiny", "m", 1e-3 * wave))
-    tab = opened(animation_page(replace(r, channels=channels, shown=("a", "b", "tiny"))))
+    tab = opened(animation_page(replace(r, channels=channels, plotted=("a", "b", "tiny"))))
     assert tab.locator(".plot").count() == 2
     assert tab.locator(".plot").first.locator(".name").all_inner_texts() == ["a", "b"]
     marks = tab.locator(".plot").first.locator(".swatch").evaluate_all("marks => marks.map((m) => m.style.background)")
