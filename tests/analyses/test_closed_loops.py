@@ -84,6 +84,28 @@ def test_backwards(case):
     np.testing.assert_allclose(reduced[:, 0, 0] * w**2, 2 * energy, rtol=1e-9)
 
 
+@pytest.mark.parametrize("turned", [0.0, 1e-12])
+def test_a_singular_position_is_refused(turned):
+    """A flat parallelogram, whose cranks may turn either way: no number there is right."""
+    m = fb.Mechanism("parallelogram", planar=True, gravity=(0, -9.81))
+    for k in range(3):  # drawn with its cranks upright
+        m.add(fb.Body(f"crank{k}", mass=1, inertia=0.1, position=(k, 0.5)))
+    m.add(fb.Body("bar", mass=1, inertia=0.1, position=(1, 1)))
+    for k in range(3):
+        m.add(fb.Revolute(f"A{k}", "ground", f"crank{k}", at=(k, 0)))
+        m.add(fb.Revolute(f"B{k}", f"crank{k}", "bar", at=(k, 1)))
+    p = m.prepare(coordinates="joint")
+    q = p.q.copy()
+    for d, name in enumerate(p.names):
+        q[d] += (turned - np.pi / 2) * (1 if name.startswith("A") else -1)
+    assert abs(p.constraint(0.0, q)).max() < 1e-12
+    zero, tau = np.zeros(len(p.v)), np.ones(len(p.v))
+    for method in (p.aba, p.loop_multipliers):
+        with pytest.raises(fb.AnalysisError, match="singular position"):
+            method(q, zero, tau)
+    assert np.isfinite(p.aba(p.q, zero, tau)).all()
+
+
 def test_gears_count_turns():
     """A coupling of angles far beyond a whole turn, in closed form."""
     m = fb.Mechanism("gears", planar=True)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Array = np.ndarray
 RANK = 1e-9
 """Singular values, relative to the largest, up to which rows count as dependent; rows have unit length before."""
+NEARLY_DEPENDENT = 1e-6
+"""Relative singular values between `RANK` and this show a singular position: rows dependent there, and not nearby."""
 INCONSISTENT = 1e-6
 """Residual of constraints or forces, relative to the largest of the state, that counts as a contradiction."""
 OFF_CONSTRAINTS = 1e-6
@@ -122,10 +124,11 @@ class ClosedLoops:
 
     @staticmethod
     def _unit_rows(rows: Constraints) -> tuple[Array, Array]:
-        """Rows divided by their norms, and the norms."""
+        """Rows divided by their norms, and the norms; rows that are zero but for rounding are zero, with norm 1."""
         norms = np.linalg.norm(rows.jacobian, axis=2, keepdims=True)
-        norms[norms == 0.0] = 1.0
-        return rows.jacobian / norms, norms[..., 0]
+        zero = norms <= RANK * norms.max(axis=1, keepdims=True, initial=0.0)
+        norms = np.where(zero, 1.0, norms)
+        return np.where(zero, 0.0, rows.jacobian / norms), norms[..., 0]
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
         """Accelerations (k, nv) and multipliers (k, nr); with dependent rows the multipliers of least norm.
@@ -148,9 +151,26 @@ class ClosedLoops:
         X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
         residual = (rows.gamma / norms)[..., None] - G @ a
         y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ residual
+        self._refuse_singular(X, y, residual)
         a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
         lam = np.linalg.pinv(X, rcond=RANK) @ y
         return a[..., 0], lam[..., 0] / norms
+
+    def _refuse_singular(self, X: Array, y: Array, residual: Array) -> None:
+        """Refuse singular positions: rows that are nearly or more dependent than at the start, or contradictory."""
+        values = np.linalg.svd(X, compute_uv=False)
+        relative = values / np.maximum(values[:, :1], np.finfo(float).tiny)
+        near = ((relative > RANK) & (relative < NEARLY_DEPENDENT)).any(axis=1)
+        start = self.rows_at(self.q[None], np.zeros((1, len(self.names))))
+        usual = int(np.linalg.matrix_rank(self._unit_rows(Constraints(start.jacobian, start.gamma))[0][0], rtol=RANK))
+        near |= (relative > RANK).sum(axis=1) < usual
+        left = np.abs(np.swapaxes(X, 1, 2) @ y - residual)[..., 0].max(axis=1, initial=0.0)
+        near |= left > INCONSISTENT * np.abs(residual).max(axis=(1, 2), initial=0.0)
+        if near.any():
+            raise AnalysisError(
+                f"state {int(np.argmax(near))} is a singular position of {self._name!r}, or nearly one: its "
+                "constraints do not determine the accelerations there. m.singularities() finds such positions"
+            )
 
     def drive_forces(self, forces: Array, q: Array, v: Array, a: Array, drives: Sequence[str]) -> Array:
         """Forces (k, drives) along the drives that replace generalised forces (k, nv) of the tree.
