@@ -372,7 +372,7 @@ class MotionMethods(Model):
             Values of parameters in place of the model's, in SI units or with a unit.
         specialize : bool
             Generate machine code of the recursive dynamics (`rnea`, `aba`, `mass_matrix` and the derivatives) for this
-            mechanism when each is first used, and keep it on disk: 2 to 5 times faster at many states, after a second
+            mechanism when each is first used, and keep it on disk: 2 to 6 times faster at many states, after a second
             of compiling for an arm, half a minute for the derivatives of a humanoid.
 
         Returns

@@ -106,6 +106,16 @@ def test_a_singular_position_is_refused(turned):
     assert np.isfinite(p.aba(p.q, zero, tau)).all()
 
 
+def test_rest_in_balance_is_no_singular_position():
+    """Nothing accelerates, and rounding in dependent rows is no contradiction; light and heavy links side by side."""
+    m = spatial_four_bar().changed(
+        {"rocker": fb.Body("rocker", mass=1e-9, inertia=(1e-12,) * 3, position=(0.55, 0.25, 0))}
+    )
+    p = m.prepare(coordinates="joint")
+    tau = p.gravity_forces(p.q)
+    np.testing.assert_allclose(p.aba(p.q, np.zeros(len(p.v)), tau), 0.0, atol=1e-6)
+
+
 def test_gears_count_turns():
     """A coupling of angles far beyond a whole turn, in closed form."""
     m = fb.Mechanism("gears", planar=True)

@@ -136,6 +136,7 @@ def test_closed_loops_stay_closed():
     x, y = 0.2 * np.sin(0.4), 0.2 * np.cos(0.4)  # the crank's end
     found = p.inverse_kinematics("coupler", (x, y))
     assert len(found) == 2 and found.freedoms == 0
+    assert not found.singular.any()
     for q in found.q:
         assert abs(p.constraint(0.0, q)).max() < 1e-9
         np.testing.assert_allclose(p.pose("coupler", q)[0][:2], (x, y), atol=1e-9)

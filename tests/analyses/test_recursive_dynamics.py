@@ -206,6 +206,7 @@ def test_generated_code_is_the_general_kernel():
     np.testing.assert_array_equal(before[2], general.rnea(q, v, a)[2])
     rest = [0, 1, 3, 4]
     np.testing.assert_array_equal(before[rest], special.rnea(q[rest], v[rest], a[rest]))
+    np.testing.assert_array_equal(special.aba(q, v, a)[rest], special.aba(q[rest], v[rest], a[rest]))
 
 
 def test_sine_and_cosine_of_vectors():

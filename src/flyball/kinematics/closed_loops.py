@@ -135,9 +135,15 @@ class ClosedLoops:
 
         With M = L L^T and X = L^-1 G^T the accelerations are those without loops plus L^-T y, where y is the shortest
         vector with X^T y = gamma - G a.
+
+        Raises
+        ------
+        AnalysisError
+            At a singular position, or where the mass matrix is singular.
         """
         rows = self.constraints(q, v)
         G, norms = self._unit_rows(rows)
+        self._refuse_singular(G)
         M, free = self.mass_matrix(q), tau - self.bias_forces(q, v)
         try:
             L = np.linalg.cholesky(M)
@@ -151,24 +157,22 @@ class ClosedLoops:
         X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
         residual = (rows.gamma / norms)[..., None] - G @ a
         y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ residual
-        self._refuse_singular(X, y, residual)
         a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
         lam = np.linalg.pinv(X, rcond=RANK) @ y
         return a[..., 0], lam[..., 0] / norms
 
-    def _refuse_singular(self, X: Array, y: Array, residual: Array) -> None:
-        """Refuse singular positions: rows that are nearly or more dependent than at the start, or contradictory."""
-        values = np.linalg.svd(X, compute_uv=False)
-        relative = values / np.maximum(values[:, :1], np.finfo(float).tiny)
-        near = ((relative > RANK) & (relative < NEARLY_DEPENDENT)).any(axis=1)
+    def _refuse_singular(self, G: Array) -> None:
+        """Refuse singular positions: rows of unit length that are nearly dependent, or more so than at the start."""
         start = self.rows_at(self.q[None], np.zeros((1, len(self.names))))
-        usual = int(np.linalg.matrix_rank(self._unit_rows(Constraints(start.jacobian, start.gamma))[0][0], rtol=RANK))
-        near |= (relative > RANK).sum(axis=1) < usual
-        left = np.abs(np.swapaxes(X, 1, 2) @ y - residual)[..., 0].max(axis=1, initial=0.0)
-        near |= left > INCONSISTENT * np.abs(residual).max(axis=(1, 2), initial=0.0)
-        if near.any():
+        at_start, _ = self._unit_rows(Constraints(start.jacobian, start.gamma))
+        values = np.linalg.svd(np.concatenate([G, at_start]) * self.dynamics.compiled.sizes, compute_uv=False)
+        relative = values / np.maximum(values[:, :1], np.finfo(float).tiny)
+        ranks = (relative > RANK).sum(axis=1)
+        nearly = np.any((relative > RANK) & (relative < NEARLY_DEPENDENT), axis=1)
+        singular = np.asarray(nearly)[:-1] | (ranks[:-1] < ranks[-1])
+        if singular.any():
             raise AnalysisError(
-                f"state {int(np.argmax(near))} is a singular position of {self._name!r}, or nearly one: its "
+                f"state {int(np.argmax(singular))} is a singular position of {self._name!r}, or nearly one: its "
                 "constraints do not determine the accelerations there. m.singularities() finds such positions"
             )
 

@@ -255,9 +255,9 @@ def _iterate(p: Prepared, t: _Target, begin: _Starts) -> tuple[Array, Array]:
         A, b = np.swapaxes(J, 1, 2) @ J, np.einsum("kij,ki->kj", J, error[active])
         at_stop = np.zeros(b.shape, bool)  # a coordinate at a stop that would go beyond it stays
         plain = begin.entry >= 0
-        x, way = q[active][:, begin.entry[plain]], b[:, plain]
+        x, downhill = q[active][:, begin.entry[plain]], b[:, plain]
         bounds = (y[begin.entry[plain]] for y in (begin.lower, begin.upper))
-        at_stop[:, plain] = ((x <= next(bounds)) & (way < 0.0)) | ((x >= next(bounds)) & (way > 0.0))
+        at_stop[:, plain] = ((x <= next(bounds)) & (downhill < 0.0)) | ((x >= next(bounds)) & (downhill > 0.0))
         b = np.where(at_stop, 0.0, b)
         A = np.where(at_stop[:, :, None] | at_stop[:, None, :], 0.0, A)
         largest = np.maximum(np.einsum("kii->ki", A).max(axis=1), np.finfo(float).tiny)
@@ -293,10 +293,13 @@ def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinem
         if all(np.abs(difference(q[k], q[i]) / units).max() > DISTINCT for i in found):
             found.append(k)
     q = q[found]
-    usual = int(_ranks(p, t, begin, begin.q).max())
-    return InverseKinematics(t.frame, q, _errors(p, t, q), _ranks(p, t, begin, q) < usual, len(p.v) - usual)
+    ranks = _ranks(p, t, begin, q)
+    # rows of loops that depend on each other do so only where the loops are closed: not at the starts
+    usual = int((ranks if t.constraints is not None else _ranks(p, t, begin, begin.q)).max())
+    return InverseKinematics(t.frame, q, _errors(p, t, q), ranks < usual, len(p.v) - usual)
 
 
 def _ranks(p: Prepared, t: _Target, begin: _Starts, q: Array) -> Array:
+    """Ranks of the Jacobians, (k,)."""
     values = np.linalg.svd(_jacobian(p, t, q) * begin.sizes, compute_uv=False)
     return (values > SINGULAR * values[:, :1]).sum(axis=1)

@@ -29,6 +29,7 @@ from ..results.recorded_kinematics import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
+from .closed_loops import ClosedLoops
 from .inverse_kinematics import InverseKinematics, PoseRequest, inverse_kinematics
 from .recursive_methods import RecursiveMethods
 
@@ -165,9 +166,14 @@ class Prepared(RecursiveMethods):
         retract(self._start.compiled.values.system, q, d)
         return q
 
+    def _loops(self) -> ClosedLoops:
+        """Return its closed loops, for recursive dynamics."""
+        tree, turns = self._recursive, self._by_coordinates
+        return ClosedLoops(tree, self.names, self.rows, self.q, turns, self.mass_matrix, self.bias_forces)
+
     def _scaled_rows(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values and Jacobians of constraint rows at many positions, lengths divided by the mechanism's."""
-        loops = self._loops
+        loops = self._loops()
         found, units = loops.rows_at(q, np.zeros((len(q), len(self.v)))), loops.row_units()
         return found.value * units, found.jacobian * units[:, None]
 

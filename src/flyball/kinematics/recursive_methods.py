@@ -141,7 +141,7 @@ class BatchDynamics:
 
     def __init__(self, start: Assembly, names: Sequence[str], specialize: bool) -> None:
         c = start.compiled
-        self._specialize = specialize
+        self.start, self._specialize = start.q, specialize
         self._code: dict[int, BatchCode | ForwardDerivativesCode | None] = {}
         S: System = c.values.system
         self.compiled, self.structure, self.names = c, c.structure, names
@@ -206,7 +206,10 @@ class BatchDynamics:
         def part(begin: int, end: int) -> int:
             """Evaluate some states; returns the first at which that failed, or ``end``."""
             mine, out = [x[begin:end] for x in states], [x[begin:end] for x in results]
-            done = code.bound(mine, out)() if code is not None else 0
+            done = 0
+            if code is not None:  # with the start in place of states that are not for it
+                near = np.where(far[begin:end, None], self.start, mine[0]) if far.any() else mine[0]
+                done = code.bound([near, *mine[1:]], out)()
             if done < len(mine[0]):  # also to find the state that fails among those of a block
                 rest = _batch_arrays([x[done:] for x in mine], [x[done:] for x in out], frame)
                 done += self.workspace.bound(rest)(task)
@@ -283,6 +286,7 @@ class RecursiveMethods:
     rows: tuple[str, ...]
     model: Any
     specialized: bool
+    _loops: Callable[[], ClosedLoops]
 
     def rnea(
         self,
@@ -322,7 +326,7 @@ class RecursiveMethods:
         """
         if drives is not None:
             forces = self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), None, threads)[0]
-            found = self._for_states(lambda x, y, f, b: self._loops.drive_forces(f, x, y, b, drives), q, v, forces, a)
+            found = self._for_states(lambda x, y, f, b: self._loops().drive_forces(f, x, y, b, drives), q, v, forces, a)
             return self._delivered(found, out)
         return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
 
@@ -385,7 +389,7 @@ class RecursiveMethods:
         if self.rows:
             if threads != 1:
                 raise ModelError("threads are for mechanisms without closed loops; leave them out")
-            found = self._for_states(lambda x, y, f: self._loops.forward_dynamics(x, y, f)[0], q, v, tau)
+            found = self._for_states(lambda x, y, f: self._loops().forward_dynamics(x, y, f)[0], q, v, tau)
             return self._delivered(found, out)
         return self._batch(FORWARD_DYNAMICS, (q, v, tau), ((len(self.v),),), out, threads)[0]
 
@@ -397,7 +401,7 @@ class RecursiveMethods:
         ndarray, (nr,) or (k, nr)
             In the order of `Prepared.rows`. With dependent rows those of least norm.
         """
-        return self._for_states(lambda x, y, f: self._loops.forward_dynamics(x, y, f)[1], q, v, tau)
+        return self._for_states(lambda x, y, f: self._loops().forward_dynamics(x, y, f)[1], q, v, tau)
 
     def dependent_velocities(self, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
         """All velocities and accelerations of a mechanism with closed loops, by independent ones w.
@@ -422,7 +426,7 @@ class RecursiveMethods:
             If these velocities are not independent, or do not determine the others.
         """
         B, c = self._for_states(
-            lambda x, y, _: self._loops.dependent_velocities(x, y, independent), q, v, v, several=True
+            lambda x, y, _: self._loops().dependent_velocities(x, y, independent), q, v, v, several=True
         )
         return B, c
 
@@ -550,7 +554,8 @@ class RecursiveMethods:
         method : {"rnea", "aba", "rnea_derivatives", "aba_derivatives"}
         q, v, a : ndarray
             Float arrays without gaps, read at each call: coordinates, velocities, accelerations (or forces, for
-            ``aba``), of one state or of k. Non-finite numbers in them give non-finite results.
+            ``aba``), of one state or of k. Numbers that are not finite, and with ``specialize`` angles beyond 1e5 rad,
+            give results that are not.
         out : ndarray, or tuple of three for derivatives
             Arrays for the results.
 
@@ -612,17 +617,6 @@ class RecursiveMethods:
         if found is None:
             found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names, self.specialized)
         return found
-
-    @property
-    def _by_coordinates(self) -> Array:
-        """Derivatives of turned angles by the coordinates, (angles, nq)."""
-        raise NotImplementedError
-
-    @property
-    def _loops(self) -> ClosedLoops:
-        return ClosedLoops(
-            self._recursive, self.names, self.rows, self.q, self._by_coordinates, self.mass_matrix, self.bias_forces
-        )
 
     def _require_tree(self, method: str) -> None:
         if self.rows:
