@@ -130,7 +130,7 @@ def test_meshes_are_found_beside_the_package(tmp_path):
         (('type="prismatic"', 'type="screw"'), "line 22: joint 'rail' has the unknown type 'screw'"),
         (('parent link="base"', 'parent link="slide"'), "form a cycle"),
         (('child link="tool"', 'child link="slide"'), "line 26: link 'slide' is the child of two joints, 'rail' and 'flange'"),
-        (('<mass value="2"/>', '<mass value="nan"/>'), "line 8: value='nan' of <mass>: 1 finite numbers are needed"),
+        (('<mass value="2"/>', '<mass value="nan"/>'), "line 8: value='nan' of <mass>: a finite number is needed"),
         (('<mass value="2"/>', ""), "line 6: <inertial> '' needs <mass>"),
         (('<mass value="2"/>', '<mass value="-2"/>'), "line 6: the mass of link 'upper-arm' is negative"),
         (('<axis xyz="1 0 0"/>', '<axis xyz="0 0 0"/>'), "the axis of joint 'rail' is zero"),

@@ -183,7 +183,8 @@ class _Reader:
         except ValueError:
             out = np.zeros(0)
         if len(out) != n or not np.isfinite(out).all():
-            self.fail(tag, f"{name}={text!r} of <{getattr(tag, 'tag', '')}>: {n} finite numbers are needed")
+            needed = "a finite number is" if n == 1 else f"{n} finite numbers are"
+            self.fail(tag, f"{name}={text!r} of <{getattr(tag, 'tag', '')}>: {needed} needed")
         return out
 
     def number(self, tag: ET.Element | None, name: str, default: str | None = None) -> float:
