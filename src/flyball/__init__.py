@@ -211,6 +211,7 @@ _HOME = {
     "SingularityError": "errors",
     "NotConverged": "errors",
     "Assembly": "assembly.assembled_state",
+    "Stepper": "simulation.stepper",
     "Prepared": "kinematics.prepared",
     "MassReport": "results.mechanism_report",
     "Mobility": "results.mobility",

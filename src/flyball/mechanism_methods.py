@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .results.singularities import Branch, Singularities
     from .results.study import Study
     from .simulation.integration_options import Stepping
+    from .simulation.stepper import Stepper
     from .symbolic.equations import Equations
     from .symbolic.export.code import Code
 else:
@@ -388,6 +389,65 @@ class MotionMethods(Model):
         from .kinematics.prepared import PrepareOptions, prepare
 
         return prepare(self, PrepareOptions.from_arguments(locals()))
+
+    def stepper(
+        self,
+        dt: float | str,
+        *,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        method: str | Stepping = "auto",
+        rtol: float = 1e-6,
+        step: float | str | None = None,
+        coordinates: str = "auto",
+        parameters: Mapping[str, float | str] | None = None,
+        t_start: float | str = 0.0,
+        copies: int | None = None,
+        threads: int = 1,
+    ) -> Stepper:
+        """A mechanism that a program advances step by step: for control loops and reinforcement learning.
+
+        Parameters
+        ----------
+        dt : float or str [s]
+            Duration of a step. Inputs are constant during a step.
+        inputs : sequence of str
+            Forces and motors, to whose laws the input is added (``"push.x"`` where there are components), and
+            parameters that laws read; as in `linearize`.
+        outputs : sequence of str
+            Sensors, and positions, angles, lengths and their rates by name, such as ``"A.angle"``, ``"A.angle_rate"``,
+            ``"tip.x"``.
+        method : str or Stepping
+            ``"auto"``: impulse time stepping if there are contacts, stops, friction or ropes, else an integrator. An
+            explicit integrator by name; ``"impulse"``, or a `Stepping` with its options.
+        rtol : float
+            Relative tolerance of the integrator.
+        step : float or str [s], optional
+            Fixed step of the integrator; by default it adapts to ``rtol``.
+        coordinates : {"auto", "absolute", "joint"}
+            Coordinates of an integrated motion.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+        t_start : float or str [s]
+            Time at the start.
+        copies : int, optional
+            Number of independent copies; inputs and outputs then are arrays with a leading axis for the copies.
+        threads : int
+            Number of threads among which the copies are divided.
+
+        Returns
+        -------
+        Stepper
+
+        Raises
+        ------
+        ModelError
+            If there is no such input or output, or the method does not support the mechanism: events and sampled
+            controllers are not supported, other controllers not together with contact.
+        """
+        from .simulation.stepper import StepperOptions, make_stepper
+
+        return make_stepper(self, StepperOptions.from_arguments(locals()))
 
     def compare(
         self,

@@ -1,4 +1,4 @@
-"""The examples of docs/prepared.md run and give what they say."""
+"""The examples of docs/prepared.md and docs/stepper.md run and give what they say."""
 
 from __future__ import annotations
 
@@ -7,3 +7,4 @@ from tests.pages import assert_examples_run
 
 def test_examples() -> None:
     assert_examples_run("prepared.md", 16)
+    assert_examples_run("stepper.md", 8)

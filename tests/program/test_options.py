@@ -29,7 +29,12 @@ from flyball.symbolic.export.code import LANGUAGES
 FAMILIES = (MotionMethods, StaticsMethods, DesignMethods, MobilityMethods)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}
 COMMANDS = typer.main.get_command(app).commands
-NOT_COMMANDS = {"assemble", "mass_properties", "prepare"}  # `check` tells two; what is prepared is for Python
+NOT_COMMANDS = {
+    "assemble",
+    "mass_properties",
+    "prepare",
+    "stepper",
+}  # `check` tells two; what is prepared is for Python
 SHARED = {"model", "change", "as_json", "help"}
 ELSEWHERE = {  # arguments that do not stand on the command line, or otherwise
     "parameters": "--set",

@@ -307,6 +307,7 @@ def compile_mechanism(
     coupled: bool = False,
     solved: bool = True,
     switches: bool = False,
+    outputs: Sequence[str] = (),
 ) -> CompiledMechanism:
     """Compile a mechanism (see `tables.structure` and `tables.values`)."""
     choices = Choices(
@@ -317,6 +318,7 @@ def compile_mechanism(
         coupled=coupled,
         solved=solved,
         switches=switches,
+        outputs=tuple(outputs),
     )
     with garbage_collection_paused():
         x = values(structure(model, choices), parameters, held)

@@ -13,9 +13,7 @@ from typing import Annotated
 
 import typer
 
-from . import equations as equations
-from . import equilibrium as equilibrium
-from . import mobility as mobility
+from . import analyses as analyses
 from . import run as run
 from . import study as study
 from . import view as view

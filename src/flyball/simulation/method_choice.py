@@ -341,7 +341,7 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
             )
         return MethodChoice(o, _remark_on_requested(o, touch))
     given = [f"{name}={getattr(o, name)!r}" for name in _given_options(o)]
-    if unknown := _unknown_to_impulse_stepping(model):
+    if unknown := unknown_to_impulse_stepping(model):
         raise ModelError(
             f"{IMPULSE_STEPPING} does not support {', '.join(unknown)}; the adaptive integrators do: leave method "
             f"out, or give method={DEFAULT_INTEGRATOR!r}"
@@ -373,7 +373,7 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
     adaptive = o.known(method=DEFAULT_INTEGRATOR)
     if not (model.contacts or model.bulk):
         return MethodChoice(adaptive)
-    asking = [*_unknown_to_impulse_stepping(model), *(f"{name}=" for name in _given_options(o))]
+    asking = [*unknown_to_impulse_stepping(model), *(f"{name}=" for name in _given_options(o))]
     if o.coordinates == "joint":
         asking.append("coordinates='joint'")
     cannot = unsupported_contacts(model, o.parameters)
@@ -394,7 +394,7 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
     return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, event-driven", _impulse_options(o))
 
 
-def _unknown_to_impulse_stepping(model: Model) -> list[str]:
+def unknown_to_impulse_stepping(model: Model) -> list[str]:
     """Return what impulse time stepping does not support."""
     return [e.title for e in (*model.events, *model.controllers, *not_for_impulse_stepping(model))]
 

@@ -40,7 +40,7 @@ from ..simulation.impulse_stepping.setup import (
     smallest_radius,
     values_with_stops,
 )
-from ..simulation.impulse_stepping.stepper import NoSolution, Stepper
+from ..simulation.impulse_stepping.stepper import ImpulseStepper, NoSolution
 from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping
 from ..tables.contact_tables import ContactTables, contact_tables
@@ -124,7 +124,7 @@ class _Settling:
     Parameters
     ----------
     scene : ContactTables
-    stepper : Stepper
+    stepper : ImpulseStepper
     held : MechanismMotion, optional
     h : float [s]
     base : Assembly
@@ -132,7 +132,7 @@ class _Settling:
     """
 
     def __init__(
-        self, scene: ContactTables, stepper: Stepper, held: MechanismMotion | None, h: float, base: Assembly
+        self, scene: ContactTables, stepper: ImpulseStepper, held: MechanismMotion | None, h: float, base: Assembly
     ) -> None:
         self.scene, self.stepper, self.held, self.t, self.h = scene, stepper, held, base.t, h
         c = base.compiled

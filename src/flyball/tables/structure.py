@@ -207,6 +207,8 @@ class Choices:
         Whether accelerations are needed; if not, no matrix pattern is prepared for factorisation.
     switches : bool
         With rows that have modes: those of a motion.
+    outputs : tuple of str
+        Names of sensors that are measured although no law uses them.
     """
 
     far: bool = False
@@ -216,6 +218,7 @@ class Choices:
     coupled: bool = False
     solved: bool = True
     switches: bool = False
+    outputs: tuple[str, ...] = ()
 
 
 DEFAULT_CHOICES = Choices()
@@ -260,9 +263,9 @@ def _built(model: Model, choices: Choices) -> Structure:
         s.branches.quantities()
         constraint_rows.measure_switches(s)
         constraint_rows.measure_released_rows(s)
-    forces.measure_quantities(
-        s, {**law_inputs.controller_names(model), **(constraint_rows.event_names(model) if c.switches else {})}
-    )
+    in_events = constraint_rows.event_names(model) if c.switches else {}
+    outputs = {name: model[name] for name in c.outputs}
+    forces.measure_quantities(s, {**outputs, **law_inputs.controller_names(model), **in_events})
     law_inputs.add_controller_slots(s)
     if c.switches:
         law_inputs.number_force_readings(s)

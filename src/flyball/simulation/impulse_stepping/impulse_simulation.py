@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,7 +47,7 @@ from .setup import (
     with_earlier_energy,
 )
 from .step_loop import solver_counts
-from .stepper import NoSolution, Stepper
+from .stepper import ImpulseStepper, NoSolution
 from .stepping_tables import (
     RunSums,
 )
@@ -58,14 +58,14 @@ class OutputRecorder:
 
     Parameters
     ----------
-    stepper : Stepper
+    stepper : ImpulseStepper
     held : MechanismMotion, optional
         The jointed mechanism.
     side_of : (movers + 1,) of int
         Index in `ContactBodies` of each mover; the last one is that of ground.
     """
 
-    def __init__(self, stepper: Stepper, held: MechanismMotion | None, side_of: np.ndarray) -> None:
+    def __init__(self, stepper: ImpulseStepper, held: MechanismMotion | None, side_of: np.ndarray) -> None:
         self.stepper, self.held, self.side_of = stepper, held, side_of
         self.t: list[float] = []
         self.pose: list[np.ndarray] = []
@@ -205,7 +205,7 @@ END_MESSAGE = "reached the end"
 def make_impulse_result(
     base: Assembly,
     scene: ContactTables,
-    stepper: Stepper,
+    stepper: ImpulseStepper,
     recorder: OutputRecorder,
     contact_bodies: ContactBodies,
     o: Stepping,
@@ -251,7 +251,7 @@ def make_impulse_result(
     return result
 
 
-def _solvers_in_words(stepper: Stepper, solver: str) -> str:
+def _solvers_in_words(stepper: ImpulseStepper, solver: str) -> str:
     """Describe the solver, and how many islands each solver solved."""
     picked = solver_counts(stepper.workspaces.F)
     if not len(picked):
@@ -262,7 +262,7 @@ def _solvers_in_words(stepper: Stepper, solver: str) -> str:
     return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 
-def _contact_health(scene: ContactTables, stepper: Stepper, o: Stepping, size: float) -> ContactHealth:
+def _contact_health(scene: ContactTables, stepper: ImpulseStepper, o: Stepping, size: float) -> ContactHealth:
     worst, counts = stepper.state.worst, stepper.state.counts
     return ContactHealth(
         solver=_solvers_in_words(stepper, o.solver),
@@ -295,6 +295,44 @@ MOST_STEPS_PER_CALL, CALL_SECONDS = (
 )  # steps between two progress reports, and their largest duration
 
 
+class ImpulseMotion(NamedTuple):
+    """A motion by impulse time stepping at its start."""
+
+    base: Assembly
+    scene: ContactTables
+    stepper: ImpulseStepper
+    held: MechanismMotion | None  # the jointed mechanism
+
+
+def begin_by_impulses(
+    model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, before: Result | None = None
+) -> ImpulseMotion:
+    """Return the motion of a model at time t, as described or at the end of an earlier result.
+
+    Raises
+    ------
+    ModelError
+        If the contact scene is invalid.
+    AnalysisError
+        If the start has no solution.
+    """
+    plain = compile_mechanism(model, parameters=parameters)
+    values = plain.values
+    found = partition_bodies(model, values_with_stops(model, values, parameters))
+    scene = contact_tables(model, values.given, (*found.free, *found.held))
+    free = len(scene.carriers.mass) - len(found.held)
+    drawn = unassembled_start(plain, t) if before is None else None
+    base = drawn or assembled_start(model, t, parameters, before)
+    held = separate_mechanism(values, t, parameters, found, free, base if before is not None else None)
+    at = place_movers(scene, body_states(drawn)) if drawn else movers_of_assembly(scene, base)
+    if before is not None:
+        place_body_sets(scene, at, before)
+    try:
+        return ImpulseMotion(base, scene, make_stepper(scene, at, values, o, held), held)
+    except NoSolution:
+        raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
+
+
 def simulate_by_impulses(
     model: Model,
     span: tuple[float, float],
@@ -316,21 +354,7 @@ def simulate_by_impulses(
     """
     since, part = time.perf_counter(), part or whole_motion()
     model = model.snapshot()
-    plain = compile_mechanism(model, parameters=parameters)
-    values = plain.values
-    found = partition_bodies(model, values_with_stops(model, values, parameters))
-    scene = contact_tables(model, values.given, (*found.free, *found.held))
-    free = len(scene.carriers.mass) - len(found.held)
-    drawn = unassembled_start(plain, span[0]) if before is None else None
-    base = drawn or assembled_start(model, span[0], parameters, before)
-    held = separate_mechanism(values, span[0], parameters, found, free, base if before is not None else None)
-    at = place_movers(scene, body_states(drawn)) if drawn else movers_of_assembly(scene, base)
-    if before is not None:
-        place_body_sets(scene, at, before)
-    try:
-        stepper = make_stepper(scene, at, values, o, held)
-    except NoSolution:
-        raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
+    base, scene, stepper, held = begin_by_impulses(model, span[0], o, parameters, before)
     names = [*scene.carriers.names, "ground"]
     counts = [-1 if n in scene.carriers.single or n == "ground" else _set_size(scene, n) for n in names]
     sides = ContactBodies(names, counts)
@@ -354,7 +378,7 @@ def _set_size(scene: ContactTables, name: str) -> int:
 
 
 def step_to_outputs(
-    stepper: Stepper,
+    stepper: ImpulseStepper,
     span: tuple[float, float],
     times: np.ndarray,
     o: Stepping,

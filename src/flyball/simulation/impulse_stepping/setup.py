@@ -36,7 +36,7 @@ from ..initial_state import InitialState, find_initial_state, initial_state_at
 from ..integration_intervals import Segment
 from ..integration_options import RESTITUTION_LAWS, Stepping
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
-from .stepper import Stepper, free_bodies
+from .stepper import ImpulseStepper, free_bodies
 from .stepping_tables import (
     LINE_FRICTION,
     LINE_ROPE,
@@ -119,7 +119,7 @@ def mechanism_tables(
     slopes[:, DIRECTIONS] = [force_directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
     c.work.options.stabilization, c.work.options.deferred = STEPS, 0.0
-    S = S._replace(force_parameters=S.force_parameters.copy())
+    S = S._replace(force_parameters=S.force_parameters.copy(), const=S.const.copy())
     line, law = single_rows(s, S, stops or {})
     A = MechanismTables(
         S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes),
@@ -441,7 +441,7 @@ def place_movers(scene: ContactTables, bodies: Mapping[str, BodyState]) -> Mover
 
 def make_stepper(
     scene: ContactTables, M: Movers, values: Values, o: Stepping, held: MechanismMotion | None = None
-) -> Stepper:
+) -> ImpulseStepper:
     """Create the stepper at the start."""
     planar = values.structure.model.planar
     state = initial_run_state(values.system.gravity)
@@ -465,7 +465,7 @@ def make_stepper(
     options.compliant = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], CONTACT_MARGIN * size
-    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints)
+    stepper = ImpulseStepper(scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints)
     choices = stepper.workspaces.O.count
     choices.coulomb = o.coulomb
     choices.most_steps = DEFAULT_SOLVER_STEPS if o.iterations is None else 0

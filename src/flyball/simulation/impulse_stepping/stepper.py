@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...collision.contact_finder import ContactFinder
 from ...collision.tables import DONE, Contacts, Geometry, Movers
+from ...compiler.kernels import StructBuffer, check_layout
 from ...engine.entry_point import engine
 from ...numerics.complementarity.contact_problem import (
     ContactProblem,
@@ -19,7 +21,7 @@ from ...numerics.complementarity.contact_problem import (
     allocate_solver,
     empty_problem,
 )
-from ...tables.table_definitions import Surfaces
+from ...tables.table_definitions import Surfaces, assign, map_arrays, named_arrays
 from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
 from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
@@ -140,7 +142,32 @@ def problem_nodes(free: FreeBodies) -> Nodes:
     return out
 
 
-class Stepper:
+class SavedState(NamedTuple):
+    """Copies of all that a step changes: see `ImpulseStepper.save`."""
+
+    free: FreeBodies
+    movers: Movers
+    run: RunState
+    finder: dict[str, Any]  # by attribute of `ContactFinder`
+    workspaces: dict[str, Any]  # by attribute of `StepWorkspaces`
+    joints: dict[str, Any]  # by field of `MechanismTables`
+
+
+CONTACT_TABLES = ("now", "before", "midway", "search")  # of `ContactFinder`, which a step changes
+KEPT_WORKSPACES = ("P", "Q", "R", "X", "Y", "Z", "E", "W", "O", "T", "U")  # all but the solvers', which hold addresses
+CONSTANT_TABLES = ("S", "R", "door", "job")  # of `MechanismTables`: no state
+
+
+def _copied(table: Any) -> Any:
+    """Return a copy of a table with arrays of its own."""
+    return map_arrays(lambda _, x: x.copy(), table)
+
+
+def _shapes(tables: dict[str, Any]) -> list[tuple[int, ...]]:
+    return [x.shape for table in tables.values() for _, x in named_arrays(table)]
+
+
+class ImpulseStepper:
     """Time stepping of free bodies, shapes, contact laws and the jointed mechanism.
 
     Parameters
@@ -197,6 +224,9 @@ class Stepper:
             state.tolerances.velocity
         )  # allowed residual of velocities [m/s] in a step that is not very short
         self.halved = 0  # steps that were divided
+        self._arguments: list[StructBuffer] = []  # of the step loop; empty after a table was replaced
+        self._addresses: list[int] = []
+        self._gravity = float(np.linalg.norm(state.gravity))
         if joints is not None:
             self._start_joints()
 
@@ -248,7 +278,7 @@ class Stepper:
         In a step so short that gravity causes less velocity than that residual, resting bodies would not be supported.
         """
         state = self.state
-        falls = REST_SHARE * h * float(np.linalg.norm(state.gravity))
+        falls = REST_SHARE * h * self._gravity
         state.times.step, state.tolerances.velocity = h, min(self.enough, falls) if falls > 0.0 else self.enough
 
     def _halve_step(self, h: float, depth: int) -> None:
@@ -272,24 +302,69 @@ class Stepper:
         """Take ``state.counts.steps_left`` steps, enlarging tables that are full."""
         self.state.addresses.search = self.finder.address
         while True:
-            r, f = self.workspaces, self.finder
-            a, b = f.now, f.before
-            status = step_loop_kernel(
-                self.geometry, self.joints, self.movers, a, b, f.midway, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E,
-                r.W, r.O, r.F, self.free, self.laws, self.state, r.T, r.U,
-            )  # fmt: skip
+            if not self._arguments:
+                self._arguments = self._loop_arguments()
+                self._addresses = [x.address for x in self._arguments]
+            status = step_loop_kernel.call(*self._addresses)
             if status == DONE:
                 return
             if status == NO_SOLUTION:
                 raise NoSolution
             if status == STEP_TOO_LONG:
                 raise StepTooLong
+            self._arguments = []
             if status == TABLES_FULL:
                 self._enlarge_row_tables()
                 continue
-            f.enlarge(status, (a if self.state.counts.steps_taken % 2 == 0 else b).count)
-            if len(f.now.at) > len(r.P.mu):
+            f = self.finder
+            f.enlarge(status, (f.now if self.state.counts.steps_taken % 2 == 0 else f.before).count)
+            if len(f.now.at) > len(self.workspaces.P.mu):
                 self.workspaces = self._enlarged_workspaces(len(f.now.at))
+
+    def _loop_arguments(self) -> list[StructBuffer]:
+        """Return the arguments of the step loop."""
+        r, f = self.workspaces, self.finder
+        tables = (
+            self.geometry, self.joints, self.movers, f.now, f.before, f.midway, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z,
+            r.E, r.W, r.O, r.F, self.free, self.laws, self.state, r.T, r.U,
+        )  # fmt: skip
+        made = [StructBuffer(x) for x in tables]
+        for of, x in zip(step_loop_kernel.parameters, made, strict=True):
+            check_layout(step_loop_kernel, of, x)
+        return made
+
+    def save(self) -> SavedState:
+        """Return a copy of the state, from which the same steps give the same bits."""
+        found, work = vars(self.finder), vars(self.workspaces)
+        return SavedState(
+            _copied(self.free), _copied(self.movers), _copied(self.state),
+            {name: _copied(found[name]) for name in CONTACT_TABLES},
+            {name: _copied(work[name]) for name in KEPT_WORKSPACES},
+            {k: _copied(x) for k, x in self.joints._asdict().items() if k not in CONSTANT_TABLES},
+        )  # fmt: skip
+
+    def restore(self, saved: SavedState) -> None:
+        """Return to a saved state, of this stepper or of another one of the same mechanism."""
+        assign(self.free, saved.free)
+        assign(self.movers, saved.movers)
+        for table, values in zip(self.state[:-1], saved.run[:-1], strict=True):  # all but the addresses
+            table[...] = values
+        found, work = vars(self.finder), vars(self.workspaces)
+        if _shapes({k: found[k] for k in CONTACT_TABLES}) != _shapes(saved.finder) or _shapes(
+            {k: work[k] for k in KEPT_WORKSPACES}
+        ) != _shapes(saved.workspaces):  # tables were enlarged since
+            found |= {name: _copied(x) for name, x in saved.finder.items()}
+            self.joints.count.needed = len(saved.workspaces["P"].J)
+            self.workspaces = make_workspaces(
+                len(self.finder.now.at), self.workspaces.P.node, self.turning, self.joints, self.state, self.solver
+            )
+            self._arguments, work = [], vars(self.workspaces)
+        for name, values in saved.finder.items():
+            assign(found[name], values)
+        for name, values in saved.workspaces.items():
+            assign(work[name], values)
+        for name, values in saved.joints.items():
+            assign(getattr(self.joints, name), values)
 
     def _enlarge_row_tables(self) -> None:
         """Enlarge the tables for rows of contacts on the mechanism."""

@@ -1,0 +1,273 @@
+"""Motions that advance from one step to the next: integrated ones, and those by impulse time stepping."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..engine.entry_point import INTEGRATE
+from ..errors import ModelError, SimulationError
+from ..laws.breakpoints import NO_BREAKPOINTS
+from ..laws.python_functions import clear_faults, deferred_interrupts
+from ..model.model import Model
+from ..numerics.integrators import time_loop as ex
+from ..numerics.integrators.butcher_tableaux import tableau
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import assign, map_arrays
+from .diagnosis import failure_reason
+from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, begin_by_impulses
+from .impulse_stepping.stepper import NoSolution, SavedState
+from .initial_state import InitialState
+from .integration_intervals import SmoothIntervals, known_breaks, laws_checked_in_steps, laws_of_time
+from .integration_options import Integration, Stepping
+from .measurement import Measurement
+from .simulate import clock_for, row_width
+
+HORIZON = 1000  # steps whose duration scales the tolerances of an integration, as the time span of a simulation does
+
+
+POSE_WIDTH = 12  # of a row of `Movers.pose`
+
+
+class StepMotion(Protocol):
+    """A motion that advances step by step."""
+
+    structure: Structure
+    tree: tuple[str, ...]  # tree joints of its coordinates
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs from now on."""
+
+    def advance(self, t: float) -> None:
+        """Move to a later time."""
+
+    def write_state(self, x: Measurement, t: float) -> None:
+        """Write the state to where it is measured, and evaluate it."""
+
+    def save(self) -> Any:
+        """Return a copy of all that `advance` changes."""
+
+    def restore(self, saved: Any) -> None:
+        """Return to a saved state."""
+
+
+class IntegratedState(NamedTuple):
+    """Copies of what a step of `IntegratedMotion` changes."""
+
+    clock: ex.StepState
+    work: Any
+
+
+class IntegratedMotion:
+    """A smooth motion, integrated by an explicit method from step to step.
+
+    Parameters
+    ----------
+    start : InitialState
+        With its own workspace, without switches.
+    o : Integration
+    dt : float [s]
+        Usual duration of a step.
+    inputs : sequence of str
+        Parameters that are inputs.
+    """
+
+    def __init__(self, start: InitialState, o: Integration, dt: float, inputs: Sequence[str]) -> None:
+        self.start, self.method = start, str(o.method)
+        c = self.c = start.assembly.compiled
+        s = self.structure = c.structure
+        self.tree = s.tree
+        c.system = c.system._replace(const=c.system.const.copy())
+        self._inputs = input_places(s.model, inputs)
+        t = start.base.t
+        clock = self.clock = clock_for(
+            start, t, t + HORIZON * dt, np.zeros(0), o, laws_checked_in_steps(c, NO_BREAKPOINTS)
+        )
+        clock.real.h_max = np.inf if o.step is None else o.step
+        clock.count.quota = clock.count.limit
+        self._timed = bool(laws_of_time(c))
+        self._call = c.bound(tableau(self.method), clock, np.zeros((2, row_width(start.assembly))))
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs from now on: forces may jump."""
+        self.c.system.const[self._inputs] = values
+        if self.clock.count.started == 1:
+            self.clock.count.started = ex.FORCES_JUMPED
+
+    def advance(self, t: float) -> None:
+        """Integrate to time t.
+
+        Raises
+        ------
+        SimulationError
+            If the integration cannot continue.
+        """
+        clock = self.clock
+        clock.real.t_end, clock.real.largest = t, max(abs(t), clock.real.largest)
+        clear_faults(self.c.array("stack"))
+        intervals = None
+        if self._timed:
+            intervals = SmoothIntervals(clock, known_breaks(self.c, float(clock.real.t), t))
+        with deferred_interrupts(self.structure.functions):
+            while True:
+                clock.count.accepted = clock.count.rejected = 0
+                self._call(INTEGRATE)
+                if clock.count.status != ex.DONE or intervals is None or not intervals.next():
+                    break
+        if clock.count.status != ex.DONE:
+            message, cause = failure_reason(
+                self.start.assembly, self.start.base, clock, with_result=False, method=self.method
+            )
+            raise SimulationError(message, None, float(clock.real.t)) from cause
+
+    def write_state(self, x: Measurement, t: float) -> None:
+        """Write the state to where it is measured, and evaluate it."""
+        y, nq, nv = self.clock.y.current, self.structure.nq, self.structure.nv
+        x.q[:], x.v[:] = y[:nq], y[nq : nq + nv]
+        x.update(t, y[nq + nv :])
+
+    def save(self) -> IntegratedState:
+        """Return copies of the integrator's state and the engine's workspace."""
+        return IntegratedState(_copied(self.clock), _copied(self.c.work))
+
+    def restore(self, saved: IntegratedState) -> None:
+        """Return to a saved state."""
+        assign(self.clock, saved.clock)
+        assign(self.c.work, saved.work)
+
+
+def _copied(table: Any) -> Any:
+    return map_arrays(lambda _, x: x.copy(), table)
+
+
+def input_places(model: Model, inputs: Sequence[str]) -> np.ndarray:
+    """Return where the values of parameters are in the constants of laws."""
+    names = list(model.parameters)
+    return np.array([names.index(name) for name in inputs], np.int64)
+
+
+class FreeCoordinates(NamedTuple):
+    """Places of free bodies' coordinates; entries of a table (n, width) are numbered row by row."""
+
+    q: np.ndarray  # (n, k) entries of q
+    v: np.ndarray  # (n, k) entries of v
+    source: np.ndarray  # (n, k) entries of the table of positions or orientations
+    twist: np.ndarray  # (n, k) entries of the table of twists
+    mover: np.ndarray  # (n,)
+
+
+class ImpulseMotion:
+    """A motion by impulse time stepping, in absolute coordinates.
+
+    Parameters
+    ----------
+    model : Model
+    t : float [s]
+    o : Stepping
+    parameters : mapping, optional
+    inputs : sequence of str
+        Parameters that are inputs.
+    """
+
+    tree: tuple[str, ...] = ()
+
+    def __init__(
+        self, model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, inputs: Sequence[str]
+    ) -> None:
+        base, scene, self.stepper, self.held = begin_by_impulses(model, t, o, parameters)
+        self.stepper.state.times.now = t
+        self.longest = o.longest
+        self.structure = base.compiled.structure
+        self._reference, self._z = base.q.copy(), base.compiled.z.copy()
+        first = {k: scene.carriers.slices[k].start for k in self.structure.place if k in scene.carriers.slices}
+        tree, free = self.structure.tables["tree"], len(self.stepper.free.turn)
+        rows = [(k, b) for name, b in self.structure.place.items() if b >= 0 and (k := first.get(name, free)) < free]
+        movers, bodies = np.array(rows, np.int64).reshape(-1, 2).T
+        n, nq, nv = (2, 3, 3) if model.planar else (3, 7, 6)  # of shifts; of a body that turns
+        q, v, k = tree.q[bodies, None], tree.v[bodies, None], movers[:, None]
+        width = self.stepper.workspaces.X.v.shape[1]
+        i = np.arange(n)
+        self._shifting = FreeCoordinates(q + i, v + i, POSE_WIDTH * k + i, width * k + i, movers)
+        i, j = (np.arange(1), np.array([5])) if model.planar else (np.arange(4), np.arange(3, 6))
+        turns = FreeCoordinates(q + np.arange(n, nq), v + np.arange(n, nv), len(i) * k + i, width * k + j, movers)
+        self._turning = FreeCoordinates(*(x[tree.nv[bodies] > n] for x in turns))
+        self._sign = np.ones((0, 1))
+        if not model.planar:  # a quaternion and its negative are the same rotation
+            same = (self.stepper.free.turn.take(self._turning.source) * base.q[self._turning.q]).sum(axis=1)
+            self._sign = np.where(same < 0.0, -1.0, 1.0)[:, None]
+        if self.held:
+            self._place_mechanism(self.held.start.assembly.compiled, model, inputs)
+        elif inputs:
+            raise ModelError(f"{model.name!r} has no force or motor that reads the inputs {', '.join(inputs)}")
+
+    def _place_mechanism(self, own: CompiledMechanism, model: Model, inputs: Sequence[str]) -> None:
+        """Find where the coordinates of the jointed mechanism are in those of the whole."""
+        s, whole = own.structure, self.structure
+        here, there = s.tables["tree"], whole.tables["tree"]
+        pairs = [(b, whole.place[name]) for name, b in s.place.items() if b >= 0]
+
+        def ranges(first: str, count: str) -> tuple[np.ndarray, np.ndarray]:
+            a = [np.arange(n) + k for b, _ in pairs for k, n in [(getattr(here, first)[b], getattr(here, count)[b])]]
+            c = [np.arange(n) + k for b, w in pairs for k, n in [(getattr(there, first)[w], getattr(here, count)[b])]]
+            return np.concatenate(a), np.concatenate(c)
+
+        self._q_from, self._q_to = ranges("q", "nq")
+        self._v_from, self._v_to = ranges("v", "nv")
+        self._v_from = self._v_from + s.nq
+        states = [(s.nq + s.nv + k, whole.state_at[n]) for n, k in s.state_at.items() if n in whole.state_at]
+        self._z_from, self._z_to = np.array(states, np.int64).reshape(-1, 2).T
+        self._inputs = input_places(s.model, inputs)
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs from now on."""
+        if self.held:
+            self.stepper.joints.S.const[self._inputs] = values
+
+    def advance(self, t: float) -> None:
+        """Step to time t, by as many equal steps as the longest step requires.
+
+        Raises
+        ------
+        SimulationError
+            If the stepping cannot continue.
+        """
+        now = float(self.stepper.state.times.now)
+        steps = max(1, math.ceil((t - now) / self.longest * (1.0 - 1e-9)))
+        try:
+            self.stepper.run(steps, (t - now) / steps)
+        except NoSolution:
+            at = float(self.stepper.state.times.now)
+            name = self.structure.model.name
+            raise SimulationError(f"{name!r} cannot continue at t = {at:.6g} s: {NO_WAY_MESSAGE}", None, at) from None
+        self.stepper.state.times.now = t
+
+    def write_state(self, x: Measurement, t: float) -> None:
+        """Write the state to where it is measured, and evaluate it."""
+        f, twist, pose = self.stepper.free, self.stepper.workspaces.X.v, self.stepper.movers.pose
+        a, b = self._shifting, self._turning
+        if len(a.mover):
+            x.q[a.q], x.v[a.v] = pose.take(a.source), twist.take(a.twist)
+        if len(b.mover) and self.structure.model.planar:
+            x.q[b.q] = self._reference[b.q] + f.angle.take(b.source)
+            x.v[b.v] = twist.take(b.twist)
+        elif len(b.mover):
+            x.q[b.q] = self._sign * f.turn.take(b.source)
+            rotation = pose[b.mover, 3:].reshape(-1, 3, 3)
+            x.v[b.v] = (twist.take(b.twist)[:, None] @ rotation)[:, 0]  # R^T w, in body axes
+        if self.held:
+            y = self.stepper.joints.clock.y.current
+            x.q[self._q_to], x.v[self._v_to] = y[self._q_from], y[self._v_from]
+            self._z[self._z_to] = y[self._z_from]
+        x.update(t, self._z)
+
+    def save(self) -> SavedState:
+        """Return copies of the stepper's tables."""
+        return self.stepper.save()
+
+    def restore(self, saved: SavedState) -> None:
+        """Return to a saved state."""
+        self.stepper.restore(saved)

@@ -1,0 +1,375 @@
+"""The stepper: a mechanism that another program advances step by step, with inputs and outputs as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..analysis_options import Options, require_count, require_positive, seconds
+from ..errors import ModelError
+from ..model.body import Initial
+from ..model.model import Model
+from ..model.unsupported_elements import unsupported_elements
+from ..tables.structure_definition import velocity_names
+from .initial_state import find_initial_state
+from .integration_options import Integration, Stepping, default_integration
+from .measurement import Measurement, model_with_inputs
+from .method_choice import AUTO_METHOD, IMPULSE_METHOD, IMPULSE_STEPPING, unknown_to_impulse_stepping
+from .step_motions import ImpulseMotion, IntegratedMotion, StepMotion
+
+MOST_STEPS = 100_000  # integration steps within one step of the stepper
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepperOptions(Options):
+    """Arguments of `Mechanism.stepper`."""
+
+    dt: float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    method: str | Stepping
+    rtol: float
+    step: float | None
+    coordinates: str
+    parameters: Mapping[str, float] | None
+    t_start: float
+    copies: int | None
+    threads: int
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own = vars(self)
+        own["dt"] = seconds(self.dt, "dt")
+        own["step"] = None if self.step is None else seconds(self.step, "step")
+        require_positive(self.dt, "dt")
+        require_count(self.threads, "threads")
+        if self.copies is not None:
+            require_count(self.copies, "copies")
+
+    def integration(self) -> Integration:
+        """Return the options of an integration; they are checked."""
+        usual = default_integration(self.coordinates, self.rtol, None, MOST_STEPS)  # type: ignore[arg-type]
+        method = usual.method if self.method == AUTO_METHOD else self.method
+        return Integration(**{**usual.choices(), "method": method, "step": self.step})
+
+
+@dataclass
+class _Copy:
+    """One copy of the mechanism: its motion, what is measured, the steps so far, and its start."""
+
+    motion: StepMotion
+    measurement: Measurement
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        self.start = self.save()
+
+    def save(self) -> tuple[int, Any, np.ndarray]:
+        return self.count, self.motion.save(), self.measurement.z.copy()
+
+    def restore(self, saved: tuple[int, Any, np.ndarray]) -> None:
+        self.count = saved[0]
+        self.motion.restore(saved[1])
+        self.measurement.z[:] = saved[2]
+
+
+@dataclass(frozen=True)
+class StepperState:
+    """A state of a `Stepper`, to which it can return. Its contents are the stepper's own affair."""
+
+    copies: tuple[tuple[_Copy, tuple[int, Any, np.ndarray]], ...]
+    inputs: np.ndarray
+
+
+class Stepper:
+    """A mechanism, or several copies of it, advanced by steps of constant duration: see `Mechanism.stepper`.
+
+    Arrays have a leading axis of length ``copies`` if that was given. The same steps give the same bits, with any
+    number of threads.
+
+    Attributes
+    ----------
+    dt : float [s]
+        Duration of a step.
+    input_names, output_names : tuple of str
+        Order of the entries of inputs and outputs.
+    copies : int, optional
+        Number of copies; None: one, and arrays without an axis for copies.
+    method : str
+        How the motion is computed, and why.
+    """
+
+    def __init__(self, model: Model, o: StepperOptions) -> None:
+        self._options, self.dt, self.copies = o, float(o.dt), o.copies
+        self.input_names, self.output_names = tuple(o.inputs), tuple(o.outputs)
+        self._model, self._parameters = model_with_inputs(model.snapshot(), self.input_names)
+        env = self._model.environment(o.parameters or {})
+        self._usual = np.array([float(env[name]) for name in self._parameters])
+        self._resets: dict[tuple[Any, ...], Model] = {}
+        self.method = _way_of_motion(self._model, o)
+        count = o.copies or 1
+        self._described = [self._begin(self._model, {}) for _ in range(count)]
+        self._copies = list(self._described)
+        self._inputs = np.tile(self._usual, (count, 1))
+        self._outputs = np.zeros((count, len(self.output_names)))
+        for k in range(count):
+            self._measure(k)
+
+    def _begin(self, model: Model, values: Mapping[str, float]) -> _Copy:
+        """Return a copy at the start, as a model describes it."""
+        o = self._options
+        parameters = {**(o.parameters or {}), **values}
+        motion: StepMotion
+        if self.method.startswith(IMPULSE_STEPPING):
+            stepping = o.method if isinstance(o.method, Stepping) else Stepping()
+            motion = ImpulseMotion(model, o.t_start, stepping, parameters, self._parameters)
+        else:
+            start = find_initial_state(model, o.t_start, parameters, None, o.coordinates)
+            motion = IntegratedMotion(start, o.integration(), self.dt, self._parameters)
+        x = Measurement(model, self.output_names, motion.tree, parameters, motion.structure)
+        return _Copy(motion, x)
+
+    def _measure(self, k: int) -> None:
+        x = self._copies[k]
+        x.motion.write_state(x.measurement, self._time(x))
+        x.measurement.outputs(self._outputs[k])
+
+    def _time(self, x: _Copy) -> float:
+        return self._options.t_start + x.count * self.dt
+
+    def _shaped(self, x: np.ndarray) -> np.ndarray:
+        """Return an array with the axis of copies only where there are copies."""
+        return x if self.copies is not None else x[0]
+
+    @property
+    def t(self) -> float | np.ndarray:
+        """Present time [s]; (copies,) of several copies."""
+        if self.copies is None:
+            return self._time(self._copies[0])
+        return np.array([self._time(x) for x in self._copies])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coordinate whose rate each velocity is, (nv,)."""
+        return tuple(x.name for x in velocity_names(self._copies[0].motion.structure))
+
+    @property
+    def q(self) -> np.ndarray:
+        """Positions, (nq,) or (copies, nq), in the coordinates of the motion; see `Prepared` for their meaning."""
+        return self._shaped(np.array([x.measurement.q for x in self._copies]))
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities, (nv,) or (copies, nv)."""
+        return self._shaped(np.array([x.measurement.v for x in self._copies]))
+
+    def outputs(self) -> np.ndarray:
+        """Return the outputs at the present state, (ny,) or (copies, ny), in SI units."""
+        return self._shaped(self._outputs.copy())
+
+    def step(self, inputs: Any = None, steps: int = 1) -> np.ndarray:
+        """Advance by a number of steps with constant inputs.
+
+        Parameters
+        ----------
+        inputs : array_like, (nu,) or (copies, nu)
+            In SI units, constant during the steps. If not given, those of the last step; at first the values of
+            parameters, and zero for forces and motors.
+        steps : int
+
+        Returns
+        -------
+        ndarray, (ny,) or (copies, ny)
+            Outputs at the end, in SI units.
+
+        Raises
+        ------
+        ModelError
+            If inputs have another shape or are not finite.
+        SimulationError
+            If the motion cannot continue. Its copy stays where that happened: `reset` it, or set `state`.
+        """
+        require_count(steps, "steps")
+        if inputs is not None:
+            self._set_inputs(inputs)
+        if self._pool is None:
+            for k in range(len(self._copies)):
+                self._advance(k, steps)
+        else:
+            list(self._pool.map(self._advance, range(len(self._copies)), [steps] * len(self._copies)))
+        return self._shaped(self._outputs.copy())
+
+    def _set_inputs(self, inputs: Any) -> None:
+        u = np.asarray(inputs, float)
+        shape = self._inputs.shape if self.copies is not None else self._inputs.shape[1:]
+        if u.shape != shape:
+            names = ", ".join(self.input_names) or "no inputs"
+            raise ModelError(f"inputs of the stepper have the shape {shape} ({names}), not {u.shape}")
+        if not np.isfinite(u).all():
+            raise ModelError(f"inputs of the stepper must be finite, got {u.tolist()}")
+        self._inputs[:] = u
+
+    def _advance(self, k: int, steps: int) -> None:
+        x = self._copies[k]
+        x.motion.set_inputs(self._inputs[k])
+        x.count += steps
+        x.motion.advance(self._time(x))
+        self._measure(k)
+
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor | None:
+        threads = min(self._options.threads, len(self._copies))
+        return ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def reset(self, values: Mapping[str, float | Sequence[float]] | None = None, copy: int | None = None) -> np.ndarray:
+        """Return to the start, with other initial values if they are given; inputs return to their first values.
+
+        Parameters
+        ----------
+        values : mapping, optional
+            Coordinate such as ``"A.angle"`` or ``"cart.x"`` to its value [m or rad], or to value and rate; the
+            mechanism is assembled with them, as with `Initial`.
+        copy : int, optional
+            Number of one copy; by default all copies are reset.
+
+        Returns
+        -------
+        ndarray, (ny,) or (copies, ny)
+            Outputs of all copies.
+
+        Raises
+        ------
+        AssemblyError
+            If there is no position with these values.
+        """
+        if copy is not None and not (isinstance(copy, int) and 0 <= copy < len(self._copies)):
+            raise ModelError(f"copy is a number from 0 to {len(self._copies) - 1}, got {copy!r}")
+        for k in range(len(self._copies)) if copy is None else (copy,):
+            if values:
+                self._copies[k] = self._begin(*self._model_at(values))
+            else:
+                self._copies[k] = self._described[k]
+                self._copies[k].restore(self._copies[k].start)
+            self._inputs[k] = self._usual
+            self._measure(k)
+        return self._shaped(self._outputs.copy())
+
+    def _model_at(self, values: Mapping[str, float | Sequence[float]]) -> tuple[Model, dict[str, float]]:
+        """Return the model with initial values that are parameters, and the values of these."""
+        numbers, described = dict[str, float](), []
+        for k, (name, x) in enumerate(values.items()):
+            pair = tuple(x) if isinstance(x, Sequence | np.ndarray) else (x,)
+            if len(pair) > 2 or not pair:
+                raise ModelError(f"{name!r} is reset to a value, or to value and rate, not to {x!r}")
+            made = [f"{what}_{k}" for what in ("initial_value", "initial_rate")[: len(pair)]]
+            numbers |= dict(zip(made, map(float, pair), strict=True))
+            described.append(Initial(name, **dict(zip(("value", "rate"), made, strict=False))))
+        key = tuple((e.name, e.rate is not None) for e in described)
+        if key not in self._resets:
+            out = self._model.copy()
+            out.parameters.update(numbers)
+            for e in described:
+                if any(i.name == e.name for i in out.initial):
+                    out.replace(e)
+                else:
+                    out.add(e)
+            self._resets[key] = out.snapshot()
+        return self._resets[key], numbers
+
+    @property
+    def state(self) -> StepperState:
+        """The complete state of all copies: setting it continues with the same bits."""
+        return StepperState(tuple((x, x.save()) for x in self._copies), self._inputs.copy())
+
+    @state.setter
+    def state(self, saved: StepperState) -> None:
+        """Return to a state that this stepper gave."""
+        if not isinstance(saved, StepperState) or len(saved.copies) != len(self._copies):
+            raise ModelError("the state is one that this stepper gave, with as many copies")
+        for k, (x, of_copy) in enumerate(saved.copies):
+            x.restore(of_copy)
+            self._copies[k] = x
+            self._measure(k)
+        self._inputs[:] = saved.inputs
+
+    def pose(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return position [m] and rotation of a body's reference frame or a named frame, in the world.
+
+        Returns
+        -------
+        position : ndarray, (3,) or (copies, 3)
+        rotation : ndarray, (3, 3) or (copies, 3, 3)
+            The frame's axes as columns.
+        """
+        return self._stacked([x.measurement.pose(name) for x in self._copies])
+
+    def velocity(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocity of a frame's origin [m/s] and its angular velocity [rad/s], along the world's axes.
+
+        Returns
+        -------
+        velocity, angular_velocity : ndarray, (3,) or (copies, 3)
+        """
+        return self._stacked([x.measurement.velocity(name) for x in self._copies])
+
+    def _stacked(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+        first, second = (self._shaped(np.array(x)) for x in zip(*pairs, strict=True))
+        return first, second
+
+    def __repr__(self) -> str:
+        return (
+            f"stepper      {self._model.name}, steps of {self.dt:g} s"
+            f"{'' if self.copies is None else f', {self.copies} copies'}\n"
+            f"inputs       {', '.join(self.input_names) or 'none'}\n"
+            f"outputs      {', '.join(self.output_names) or 'none'}\n"
+            f"method       {self.method}"
+        )
+
+
+def _way_of_motion(model: Model, o: StepperOptions) -> str:
+    """Return how the motion is computed, and why.
+
+    Raises
+    ------
+    ModelError
+        If the method, or every method, does not support the model or the options.
+    """
+    name = model.name
+    if sampled := [e.title for e in model.controllers if e.sampled]:
+        raise ModelError(
+            f"a stepper of {name!r} does not sample {sampled[0]}: compute its output between the steps and give it as "
+            "an input, or leave out its period"
+        )
+    switching = [e.title for e in unsupported_elements(model)]
+    unknown = unknown_to_impulse_stepping(model)
+    if (o.method not in (AUTO_METHOD, IMPULSE_METHOD) and not isinstance(o.method, Stepping)) or not (
+        switching or o.method != AUTO_METHOD
+    ):
+        if switching:
+            raise ModelError(
+                f"a stepper of {name!r} with method={o.method!r} does not support {switching[0]}: leave method out, "
+                "and it uses impulse time stepping"
+            )
+        used = o.integration()
+        return f"{used.method}, {f'steps of {used.step:g} s' if used.step else f'rtol {used.rtol:g}'}"
+    if unknown:
+        why = f", which {switching[0]} needs" if switching else ""
+        raise ModelError(
+            f"a stepper of {name!r}: {IMPULSE_STEPPING}{why} does not support {unknown[0]}. Compute it between the "
+            "steps and give it as an input, or leave one of the two out"
+        )
+    if o.step is not None or o.coordinates == "joint":
+        given = "step=, whose Stepping(step=...) is" if o.step is not None else "coordinates='joint', since its are"
+        tail = " theirs" if o.step is not None else " absolute"
+        raise ModelError(f"{IMPULSE_STEPPING} does not take {given}{tail}; leave it out")
+    return f"{IMPULSE_STEPPING}: {'as requested' if o.method != AUTO_METHOD else f'for {switching[0]}'}"
+
+
+def make_stepper(model: Model, o: StepperOptions) -> Stepper:
+    """Return the stepper: see `Mechanism.stepper`."""
+    return Stepper(model, o)
