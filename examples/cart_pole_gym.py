@@ -15,17 +15,21 @@ import flyball as fb
 
 CART, POLE, HALF_LENGTH = 1.0, 0.1, 0.5  # kg, kg, m
 LARGEST_FORCE, RAIL, LARGEST_ANGLE = 10.0, 2.4, np.radians(12)  # N, m, rad
+LEAN = np.radians(2)  # rad: how the pole is drawn
 FEEDBACK = np.array([1.0, 2.0, -30.0, -8.0])  # N/m, N s/m, N/rad, N s/rad; the angle is positive to the left
 
 
 def mechanism() -> fb.Mechanism:
-    """Cart and upright pole (Barto, Sutton and Anderson 1983), without friction."""
+    """Cart and pole, which leans a little (Barto, Sutton and Anderson 1983), without friction."""
     m = fb.Mechanism("cart and pole", planar=True, gravity=(0, -9.81))
     m.add(fb.Body("cart", mass=CART, inertia=0.01, shape=fb.Box(edges=(0.4, 0.2, 0.2))))
     pole = fb.Box(edges=(0.04, 2 * HALF_LENGTH, 0.04))
-    m.add(fb.Body("pole", mass=POLE, inertia=POLE * HALF_LENGTH**2 / 3, position=(0, HALF_LENGTH), shape=pole))
-    m.add(fb.Prismatic("rail", "ground", "cart", at=(0, 0), axis=(1, 0)), fb.Revolute("pin", "cart", "pole", at=(0, 0)))
-    m.add(fb.Actuator("push", "rail.displacement", force="0"), fb.Initial("pin.angle", value="2 deg"))
+    centre = (-HALF_LENGTH * np.sin(LEAN), HALF_LENGTH * np.cos(LEAN))
+    inertia = POLE * HALF_LENGTH**2 / 3
+    m.add(fb.Body("pole", mass=POLE, inertia=inertia, position=centre, angle=LEAN, shape=pole))
+    m.add(fb.Prismatic("rail", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Revolute("pin", "cart", "pole", at=(0, 0), angle=LEAN))
+    m.add(fb.Actuator("push", "rail.displacement", force="0"))
     return m
 
 
