@@ -81,13 +81,13 @@ class Measurement:
     tree : sequence of str
         Tree joints of the motion's coordinates; empty for absolute coordinates.
     parameters : mapping, optional
-    other : Structure
-        Of the motion, whose angle states are taken over.
 
     Attributes
     ----------
+    state : ndarray (ny,)
+        The state (q, v, z) that `update` evaluates; to be written in place.
     q, v : ndarray (nq,), (nv,)
-        The state that `update` evaluates; to be written in place.
+        Parts of it.
 
     Raises
     ------
@@ -101,7 +101,6 @@ class Measurement:
         outputs: Sequence[str],
         tree: Sequence[str],
         parameters: Mapping[str, float] | None,
-        other: Structure,
     ) -> None:
         model, names = _with_sensors(model, outputs)
         c = self._compiled = compile_mechanism(model, parameters=parameters, tree=tree, outputs=names, solved=False)
@@ -111,19 +110,22 @@ class Measurement:
         clock = StepState(
             StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64)
         )
-        self._time, state = clock.real, y.current
-        state[:] = np.concatenate([c.values.q, c.values.v, c.z])
-        self.q, self.v, self.z = state[: s.nq], state[s.nq : s.nq + s.nv], state[s.nq + s.nv :]
+        self._time, self.state = clock.real, y.current
+        self.state[:] = np.concatenate([c.values.q, c.values.v, c.z])
+        self.q, self.v = self.state[: s.nq], self.state[s.nq : s.nq + s.nv]
         self._evaluate = c.bound(tableau("rk45"), clock, np.zeros((0, 0)))
         self._columns = np.array([s.slots[name] for name in names], np.int64)
         self._values, self._records = c.work.sensed.value, c.work.BK
-        shared = [(other.state_at[name], k) for name, k in s.state_at.items() if name in other.state_at]
-        self.theirs, self.ours = np.array(shared, np.int64).reshape(-1, 2).T
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
 
-    def update(self, t: float, z: np.ndarray) -> None:
-        """Evaluate at time t and the state in ``q`` and ``v``; ``z`` are the states of the motion besides these."""
-        self.z[self.ours] = z[self.theirs]
+    def common_states(self, other: Structure) -> list[tuple[int, int]]:
+        """Return the entries of controller states, angles and places in the state of another structure, and in this."""
+        first, here = other.nq + other.nv, self.structure.nq + self.structure.nv
+        own = self.structure.state_at
+        return [(first + k, here + own[name]) for name, k in other.state_at.items() if name in own]
+
+    def update(self, t: float) -> None:
+        """Evaluate at time t and the state."""
         self._time.t = t
         self._evaluate(POSITION)
 

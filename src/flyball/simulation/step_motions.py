@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.entry_point import INTEGRATE
 from ..errors import ModelError, SimulationError
 from ..laws.breakpoints import NO_BREAKPOINTS
@@ -45,8 +44,11 @@ class StepMotion(Protocol):
     def advance(self, t: float) -> None:
         """Move to a later time."""
 
-    def write_state(self, x: Measurement, t: float) -> None:
-        """Write the state to where it is measured, and evaluate it."""
+    def measure_by(self, x: Measurement) -> None:
+        """Prepare for `write_state` to a measurement in the coordinates of the motion."""
+
+    def write_state(self, x: Measurement) -> None:
+        """Write the state to that measurement."""
 
     def save(self) -> Any:
         """Return a copy of all that `advance` changes."""
@@ -124,11 +126,14 @@ class IntegratedMotion:
             )
             raise SimulationError(message, None, float(clock.real.t)) from cause
 
-    def write_state(self, x: Measurement, t: float) -> None:
-        """Write the state to where it is measured, and evaluate it."""
-        y, nq, nv = self.clock.y.current, self.structure.nq, self.structure.nv
-        x.q[:], x.v[:] = y[:nq], y[nq : nq + nv]
-        x.update(t, y[nq + nv :])
+    def measure_by(self, x: Measurement) -> None:
+        """Prepare for `write_state`."""
+        n = self.structure.nq + self.structure.nv
+        self._from, self._to = np.array([*((k, k) for k in range(n)), *x.common_states(self.structure)], np.int64).T
+
+    def write_state(self, x: Measurement) -> None:
+        """Write the state to the measurement."""
+        x.state[self._to] = self.clock.y.current.take(self._from)
 
     def save(self) -> IntegratedState:
         """Return copies of the integrator's state and the engine's workspace."""
@@ -153,8 +158,8 @@ def input_places(model: Model, inputs: Sequence[str]) -> np.ndarray:
 class FreeCoordinates(NamedTuple):
     """Places of free bodies' coordinates; entries of a table (n, width) are numbered row by row."""
 
-    q: np.ndarray  # (n, k) entries of q
-    v: np.ndarray  # (n, k) entries of v
+    q: np.ndarray  # (n, k) entries of the state
+    v: np.ndarray  # (n, k) entries of the state for their rates
     source: np.ndarray  # (n, k) entries of the table of positions or orientations
     twist: np.ndarray  # (n, k) entries of the table of twists
     mover: np.ndarray  # (n,)
@@ -182,13 +187,13 @@ class ImpulseMotion:
         self.stepper.state.times.now = t
         self.longest = o.longest
         self.structure = base.compiled.structure
-        self._reference, self._z = base.q.copy(), base.compiled.z.copy()
+        self._reference = base.q.copy()
         first = {k: scene.carriers.slices[k].start for k in self.structure.place if k in scene.carriers.slices}
         tree, free = self.structure.tables["tree"], len(self.stepper.free.turn)
         rows = [(k, b) for name, b in self.structure.place.items() if b >= 0 and (k := first.get(name, free)) < free]
         movers, bodies = np.array(rows, np.int64).reshape(-1, 2).T
         n, nq, nv = (2, 3, 3) if model.planar else (3, 7, 6)  # of shifts; of a body that turns
-        q, v, k = tree.q[bodies, None], tree.v[bodies, None], movers[:, None]
+        q, v, k = tree.q[bodies, None], self.structure.nq + tree.v[bodies, None], movers[:, None]
         width = self.stepper.workspaces.X.v.shape[1]
         i = np.arange(n)
         self._shifting = FreeCoordinates(q + i, v + i, POSE_WIDTH * k + i, width * k + i, movers)
@@ -200,27 +205,23 @@ class ImpulseMotion:
             same = (self.stepper.free.turn.take(self._turning.source) * base.q[self._turning.q]).sum(axis=1)
             self._sign = np.where(same < 0.0, -1.0, 1.0)[:, None]
         if self.held:
-            self._place_mechanism(self.held.start.assembly.compiled, model, inputs)
+            self._inputs = input_places(self.held.start.assembly.compiled.structure.model, inputs)
         elif inputs:
             raise ModelError(f"{model.name!r} has no force or motor that reads the inputs {', '.join(inputs)}")
 
-    def _place_mechanism(self, own: CompiledMechanism, model: Model, inputs: Sequence[str]) -> None:
-        """Find where the coordinates of the jointed mechanism are in those of the whole."""
-        s, whole = own.structure, self.structure
-        here, there = s.tables["tree"], whole.tables["tree"]
-        pairs = [(b, whole.place[name]) for name, b in s.place.items() if b >= 0]
-
-        def ranges(first: str, count: str) -> tuple[np.ndarray, np.ndarray]:
-            a = [np.arange(n) + k for b, _ in pairs for k, n in [(getattr(here, first)[b], getattr(here, count)[b])]]
-            c = [np.arange(n) + k for b, w in pairs for k, n in [(getattr(there, first)[w], getattr(here, count)[b])]]
-            return np.concatenate(a), np.concatenate(c)
-
-        self._q_from, self._q_to = ranges("q", "nq")
-        self._v_from, self._v_to = ranges("v", "nv")
-        self._v_from = self._v_from + s.nq
-        states = [(s.nq + s.nv + k, whole.state_at[n]) for n, k in s.state_at.items() if n in whole.state_at]
-        self._z_from, self._z_to = np.array(states, np.int64).reshape(-1, 2).T
-        self._inputs = input_places(s.model, inputs)
+    def measure_by(self, x: Measurement) -> None:
+        """Find where the state of the jointed mechanism is in that of the whole."""
+        self._from = self._to = np.zeros(0, np.int64)
+        if not self.held:
+            return
+        s, whole = self.held.start.assembly.compiled.structure, self.structure
+        here, there, pairs = s.tables["tree"], whole.tables["tree"], x.common_states(s)
+        for name, b in s.place.items():
+            if b >= 0:
+                k = whole.place[name]
+                pairs += [(here.q[b] + i, there.q[k] + i) for i in range(here.nq[b])]
+                pairs += [(s.nq + here.v[b] + i, whole.nq + there.v[k] + i) for i in range(here.nv[b])]
+        self._from, self._to = np.array(pairs, np.int64).T
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Set the inputs from now on."""
@@ -245,24 +246,21 @@ class ImpulseMotion:
             raise SimulationError(f"{name!r} cannot continue at t = {at:.6g} s: {NO_WAY_MESSAGE}", None, at) from None
         self.stepper.state.times.now = t
 
-    def write_state(self, x: Measurement, t: float) -> None:
-        """Write the state to where it is measured, and evaluate it."""
+    def write_state(self, x: Measurement) -> None:
+        """Write the state to the measurement."""
         f, twist, pose = self.stepper.free, self.stepper.workspaces.X.v, self.stepper.movers.pose
-        a, b = self._shifting, self._turning
+        a, b, state = self._shifting, self._turning, x.state
         if len(a.mover):
-            x.q[a.q], x.v[a.v] = pose.take(a.source), twist.take(a.twist)
+            state[a.q], state[a.v] = pose.take(a.source), twist.take(a.twist)
         if len(b.mover) and self.structure.model.planar:
-            x.q[b.q] = self._reference[b.q] + f.angle.take(b.source)
-            x.v[b.v] = twist.take(b.twist)
+            state[b.q] = self._reference[b.q] + f.angle.take(b.source)
+            state[b.v] = twist.take(b.twist)
         elif len(b.mover):
-            x.q[b.q] = self._sign * f.turn.take(b.source)
+            state[b.q] = self._sign * f.turn.take(b.source)
             rotation = pose[b.mover, 3:].reshape(-1, 3, 3)
-            x.v[b.v] = (twist.take(b.twist)[:, None] @ rotation)[:, 0]  # R^T w, in body axes
+            state[b.v] = (twist.take(b.twist)[:, None] @ rotation)[:, 0]  # R^T w, in body axes
         if self.held:
-            y = self.stepper.joints.clock.y.current
-            x.q[self._q_to], x.v[self._v_to] = y[self._q_from], y[self._v_from]
-            self._z[self._z_to] = y[self._z_from]
-        x.update(t, self._z)
+            state[self._to] = self.stepper.joints.clock.y.current.take(self._from)
 
     def save(self) -> SavedState:
         """Return copies of the stepper's tables."""

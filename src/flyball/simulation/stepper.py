@@ -70,12 +70,12 @@ class _Copy:
         self.start = self.save()
 
     def save(self) -> tuple[int, Any, np.ndarray]:
-        return self.count, self.motion.save(), self.measurement.z.copy()
+        return self.count, self.motion.save(), self.measurement.state.copy()
 
     def restore(self, saved: tuple[int, Any, np.ndarray]) -> None:
         self.count = saved[0]
         self.motion.restore(saved[1])
-        self.measurement.z[:] = saved[2]
+        self.measurement.state[:] = saved[2]
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,14 @@ class Stepper:
         else:
             start = find_initial_state(model, o.t_start, parameters, None, o.coordinates)
             motion = IntegratedMotion(start, o.integration(), self.dt, self._parameters)
-        x = Measurement(model, self.output_names, motion.tree, parameters, motion.structure)
+        x = Measurement(model, self.output_names, motion.tree, parameters)
+        motion.measure_by(x)
         return _Copy(motion, x)
 
     def _measure(self, k: int) -> None:
         x = self._copies[k]
-        x.motion.write_state(x.measurement, self._time(x))
+        x.motion.write_state(x.measurement)
+        x.measurement.update(self._time(x))
         x.measurement.outputs(self._outputs[k])
 
     def _time(self, x: _Copy) -> float:
