@@ -255,9 +255,9 @@ def __getattr__(name: str) -> Any:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
-    from .model.messages import suggest
+    from .model.messages import suggest_part
 
-    hint = "" if name.startswith("_") else suggest(name, __dir__())
+    hint = "" if name.startswith("_") else suggest_part(name, __dir__())
     raise AttributeError(f"module 'flyball' has no attribute {name!r}{hint}")
 
 

@@ -2,7 +2,9 @@
 
 import math
 import re
+import warnings
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -154,3 +156,45 @@ def test_tonnes_and_units_that_look_like_names_stay_what_they_are(text, value):
 def test_time_behind_a_unit_is_no_tonne_in_a_field():
     with pytest.raises(fb.UnitError, match=r"mass of Body 'b': '5 kg\*t': 't' after a unit is time"):
         fb.Mechanism("a", planar=True).add(fb.Body("b", mass="5 kg*t", inertia=1.0))
+
+
+def _with_parameters(**values):
+    m = fb.Mechanism("a", planar=True, parameters=values)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("text", "add", "message"),
+    [
+        ("50 cm", lambda: fb.Body("c", mass="L", inertia=1), "mass of Body 'c': the parameter 'L' is '50 cm': expected a"),
+        ("30 deg", lambda: fb.Body("c", mass=1, inertia=1, position=("L", 0)), "position of Body 'c'.*expected a length"),
+        ("2 N/mm", lambda: fb.Body("c", mass=1, inertia=1, shape=fb.Box(edges=("L", 1, 1))), "edges of Box.*a length"),
+        ("3 N", lambda: fb.Motor("M", "A", torque="L"), "torque of Motor 'M': the parameter 'L' is '3 N': expected a torque"),
+    ],
+)  # fmt: skip
+def test_a_parameter_of_another_kind_is_refused(text, add, message):
+    """A bare name of a parameter that was written with a unit; formulas such as 2*L are in SI, as before."""
+    with pytest.raises(fb.UnitError, match=message):
+        _with_parameters(L=text).add(add())
+
+
+def test_a_changed_parameter_of_another_kind_is_refused():
+    m = _with_parameters(M=0.4)
+    m.add(fb.Body("c", mass="M", inertia=1))
+    m.simulate(0.01, outputs=2, parameters={"M": "400 g"})
+    m.simulate(0.01, outputs=2, parameters={"M": 5.0})
+    with pytest.raises(fb.UnitError, match="mass of Body 'c': the parameter 'M' is '5 m': expected a mass"):
+        m.simulate(0.01, outputs=2, parameters={"M": "5 m"})
+    m.parameters["M"] = "5 N"
+    with pytest.raises(fb.UnitError, match="mass of Body 'c'"):
+        m.simulate(0.01, outputs=2)
+
+
+def test_whole_numbers_of_many_turns_are_asked_about():
+    with pytest.warns(fb.ModelWarning, match=r"value 30 is in rad, 4.8 turns; write '30 deg'"):
+        _with_parameters().add(fb.Initial("A.angle", value=30))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for value in (3, 4 * np.pi, "30 rad", "30 deg", 31.4159):
+            _with_parameters().add(fb.Initial("A.angle", value=value))

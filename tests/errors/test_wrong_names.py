@@ -90,3 +90,32 @@ def test_it_is_told(case):
     ask, message = CASES[case]
     with pytest.raises(fb.ModelError, match=message):
         ask()
+
+
+@pytest.mark.parametrize(
+    ("name", "here"), [("Spring", "SpringDamper"), ("Hinge", "Revolute"), ("Weld", "Fixed"), ("Belt", "GearPair")]
+)
+def test_names_of_other_programs_lead_to_those_here(name, here):
+    with pytest.raises(AttributeError, match=rf"no attribute '{name}' \(did you mean '{here}'\?\)"):
+        getattr(fb, name)
+
+
+def test_every_name_of_another_program_leads_to_something():
+    from flyball.model.messages import NAMES_ELSEWHERE
+
+    assert {x for x in NAMES_ELSEWHERE.values() if not hasattr(fb, x)} == set()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: fb.Body("b", m=1), r"unknown field 'm' \(did you mean 'mass'\?\)"),
+        (lambda: fb.SpringDamper("s", "a", "b", k=1), r"unknown field 'k' \(did you mean 'stiffness'\?\)"),
+        (lambda: fb.Revolute("ground", "rod"), r"'body_j' is missing; the name comes first: \('a name', 'ground', 'rod'"),
+        (lambda: crank().simulate(1, outputs=0.01), r"for one every 0.01 s: outputs=np.arange\(0, 1, 0.01\)"),
+        (lambda: fb.load("README.md"), r"README.md is no model file, these end in \.toml"),
+    ],
+)  # fmt: skip
+def test_near_misses_get_the_right_word(make, message):
+    with pytest.raises(fb.ModelError, match=message):
+        make()

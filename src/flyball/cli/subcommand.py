@@ -192,7 +192,7 @@ def command(
         run.__signature__ = inspect.Signature([shared[0], *first, *rest, *extra, *shared[1:]])  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}  # type: ignore[attr-defined]
         run.__doc__ = f"{first_doc_line(method)}\n\n{inspect.getdoc(conclude) or ''}".strip()
-        app.command(name or method.__name__.replace("_", "-"))(run)
+        app.command(name or method.__name__.replace("_", "-"), short_help=first_doc_line(method))(run)
         return conclude
 
     return register

@@ -56,7 +56,7 @@ def _page_file(file: Path) -> Path:
     return page
 
 
-@app.command(name="compile")
+@app.command(name="compile", short_help="Compile everything that would be compiled on first use.")
 def compile_kernels() -> None:
     """Compile, on all cores, everything that would be compiled on first use, and store it for this user."""
     with report_errors(False):

@@ -22,6 +22,7 @@ from pydantic_core import ArgsKwargs
 
 from ..errors import ModelError
 from .expressions import number
+from .messages import FIELDS_ELSEWHERE
 
 T = TypeVar("T", bound=type)
 LARGEST_NUMBER = 1e50  # largest numbers of elements; products of several of them must stay finite
@@ -184,7 +185,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
             short[where] = max(short.get(where, 0), e["loc"][-1] + 1)
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             if where not in by_place:
-                lines.append(f"field {where!r} is missing")
+                lines.append(f"field {where!r} is missing{_without_name(where, known, args, kwargs)}")
         elif e["type"] == "unexpected_positional_argument":
             lines.append(f"give field {where!r} by its name: {where}=...")
         elif e["type"] in ("too_long", "too_short"):
@@ -201,6 +202,14 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         value = kwargs.get(where, dict(zip(known, args, strict=False)).get(where))
         lines.append(f"field {where!r} must be {' or '.join(dict.fromkeys(wanted))}, got {value!r}")
     return f"{who}: " + "; ".join(dict.fromkeys(lines))
+
+
+def _without_name(missing: str, known: list[str], args: tuple, kwargs: Mapping[str, Any]) -> str:
+    """Return a hint where the first argument, the name, was left out, so that the last body seems to be missing."""
+    first = known[: known.index(missing)]
+    if missing != "body_j" or "name" in kwargs or len(args) != len(first) or not all(isinstance(x, str) for x in args):
+        return ""
+    return f"; the name comes first: ('a name', {', '.join(map(repr, args))}, ...)"
 
 
 _TYPES = {
@@ -228,7 +237,8 @@ def _short(value: Any) -> str:
 def _did_you_mean(word: str, known: list[str]) -> str:
     import difflib
 
-    close = difflib.get_close_matches(word, known, 1)
+    usual = FIELDS_ELSEWHERE.get(word.lower())
+    close = [usual] if usual in known else difflib.get_close_matches(word, known, 1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 

@@ -285,7 +285,10 @@ def _evaluated(x: Expression, env: Mapping[str, Any]) -> Any:
 def _of_text(value: str, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
     parts = split_quantity(value)
     if parts is None:
-        return _evaluated(Expression.parse(value), env)
+        expression = Expression.parse(value)
+        if expression.tree.kind == "name":
+            check_dimension(expression.tree.value, env, dimension)
+        return _evaluated(expression, env)
     names = {*names, *CONSTANTS}
     if parts[1]:
         refuse_attached(*parts, names, dimension)
@@ -379,7 +382,35 @@ OPERATIONS = {
 _UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function", "called"})
 
 
-def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
+class ParameterValues(dict[str, Any]):
+    """Values of parameters in SI units; ``written`` has the quantities with a unit as they were written."""
+
+    written: Mapping[str, str]
+
+
+def _with_units(values: Mapping[str, Any], written: Mapping[str, Any]) -> ParameterValues:
+    out = ParameterValues(values)
+    pairs = ((k, x, split_quantity(x)) for k, x in written.items() if isinstance(x, str))
+    out.written = {k: x for k, x, parts in pairs if parts is not None and parts[1]}
+    return out
+
+
+def check_dimension(name: str, env: Mapping[str, Any], dimension: str | None, where: str = "") -> None:
+    """Refuse a parameter, written with a unit, in place of a quantity of another kind.
+
+    Raises
+    ------
+    UnitError
+    """
+    text = env.written.get(name) if isinstance(env, ParameterValues) and dimension is not None else None
+    if text is not None:
+        try:
+            to_si(text, dimension)
+        except UnitError as error:
+            raise UnitError(f"{where}the parameter {name!r} is {error}") from None
+
+
+def resolve_parameters(parameters: Mapping[str, Any]) -> ParameterValues:
     """The values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
 
     Raises
@@ -405,7 +436,7 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
             raise ExpressionError(f"parameter '{name}': {error}") from None
     for name in _in_order(formulas):
         values[name] = number(formulas[name], values, None, f"parameter '{name}'")
-    return {name: values[name] for name in parameters}
+    return _with_units({name: values[name] for name in parameters}, parameters)
 
 
 def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
@@ -420,7 +451,7 @@ def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
 
 def resolve_changed(
     known: Mapping[str, Any], formulas: Mapping[str, Expression], changed: Mapping[str, Any]
-) -> dict[str, Any]:
+) -> ParameterValues:
     """Resolve parameters again with some changed to numbers: only these and their dependents are evaluated.
 
     ``known`` are all values as they were, ``formulas`` those of `parameter_formulas`.
@@ -433,7 +464,8 @@ def resolve_changed(
         if name not in changed and not reached.isdisjoint(formula.names):
             out[name] = number(formula, out, None, f"parameter '{name}'")
             reached.add(name)
-    return out
+    written = known.written if isinstance(known, ParameterValues) else {}
+    return _with_units(out, {**written, **changed})
 
 
 def _in_order(formulas: Mapping[str, Expression]) -> list[str]:

@@ -21,6 +21,40 @@ def suggest(name: object, known: Iterable[str]) -> str:
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
+NAMES_ELSEWHERE = {
+    "ball": "Spherical", "balljoint": "Spherical", "sphericaljoint": "Spherical", "hinge": "Revolute",
+    "pin": "Revolute", "pinjoint": "Revolute", "revolutejoint": "Revolute", "rotationaljoint": "Revolute",
+    "slider": "Prismatic", "slidejoint": "Prismatic", "prismaticjoint": "Prismatic", "translationaljoint": "Prismatic",
+    "weld": "Fixed", "weldjoint": "Fixed", "fixedjoint": "Fixed", "rigid": "Fixed", "cardan": "Universal",
+    "hooke": "Universal", "universaljoint": "Universal",
+    "spring": "SpringDamper", "damper": "SpringDamper", "linearspring": "SpringDamper", "dashpot": "SpringDamper",
+    "torsionspring": "TorsionalSpringDamper", "rotaryspring": "TorsionalSpringDamper", "torsionaldamper": "TorsionalSpringDamper",
+    "force": "PointForce", "torque": "PointTorque", "motion": "Driver", "jointmotion": "Driver",
+    "gear": "GearPair", "gears": "GearPair", "belt": "GearPair", "chain": "GearPair", "rack": "RackAndPinion",
+    "rackpinion": "RackAndPinion", "coupling": "Coupler", "part": "Body", "rigidbody": "Body",
+    "solidbody": "Body", "marker": "Frame", "site": "Frame", "point": "Frame", "system": "Mechanism",
+    "multibodysystem": "Mechanism", "world": "Mechanism", "model": "Mechanism", "brick": "Box", "cuboid": "Box",
+    "stop": "Limit", "endstop": "Limit", "jointlimit": "Limit", "friction": "JointFriction",
+    "simulator": "Stepper", "environment": "Stepper",
+}  # fmt: skip
+"""Names of parts in other programs, in lower case, and the names here."""
+FIELDS_ELSEWHERE = {
+    "m": "mass", "k": "stiffness", "c": "damping", "d": "damping", "b": "damping", "j": "inertia", "i": "inertia",
+    "i_zz": "inertia", "izz": "inertia", "moment_of_inertia": "inertia", "pos": "position", "origin": "position",
+    "rpy": "orientation", "quaternion": "orientation", "rotation": "orientation", "l0": "length", "rest_length":
+    "length", "free_length": "length", "body1": "body_i", "body2": "body_j", "body_a": "body_i", "body_b": "body_j",
+    "parent": "body_i", "child": "body_j", "location": "at", "anchor": "at", "mu": "friction", "e": "restitution",
+    "r": "radius", "size": "edges", "ratio": "teeth", "min": "lower", "max": "upper", "tau": "torque", "v": "velocity",
+}  # fmt: skip
+"""Names of fields in formulas and other programs, in lower case, and the names here."""
+
+
+def suggest_part(name: str, known: Iterable[str]) -> str:
+    """Return ' (did you mean ...?)' for the name of a class: as other programs call it, or a similar name."""
+    here = NAMES_ELSEWHERE.get(name.lower())
+    return f" (did you mean {here!r}?)" if here else suggest(name, known)
+
+
 def listing(names: list[str]) -> str:
     """List existing names, for messages."""
     if not names:

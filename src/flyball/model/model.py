@@ -16,7 +16,7 @@ from .contact import Contact, Material, MaterialPair
 from .controller import IMU, Controller, Sensor
 from .element import Element, LawOf, Number, field_with, fields_with, python_data, resolve
 from .event import Event
-from .expressions import Expression, number, parameter_formulas, resolve_changed, resolve_parameters
+from .expressions import Expression, ParameterValues, number, parameter_formulas, resolve_changed, resolve_parameters
 from .force import Force, Unilateral
 from .geometry import vector
 from .joint import Coupling, Joint
@@ -68,7 +68,7 @@ class Model:
             raise ModelError(f"the name of a mechanism is a text, not {name!r}")
         self.name = name
         self.planar = bool(planar)
-        self._resolved: tuple[dict, dict[str, float], dict[str, Expression]] | None = None
+        self._resolved: tuple[dict, ParameterValues, dict[str, Expression]] | None = None
         if not isinstance(parameters, Mapping | None):
             raise ModelError(
                 f"parameters of {name!r} maps names to values, for instance {{'mass': 2}}, not {parameters!r}"

@@ -168,7 +168,12 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
     except OSError as error:
         raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
     with paths_from(path.parent):
-        return loads(text, cls, os.fspath(path))
+        try:
+            return loads(text, cls, os.fspath(path))
+        except ModelError as error:
+            if path.suffix.lower() == ".toml":
+                raise
+            raise ModelError(f"{path} is no model file, these end in .toml, .py, .urdf or .xml: {error}") from None
 
 
 def loads(text: str, cls: type[M], source: str = "model") -> M:

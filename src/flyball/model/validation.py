@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import keyword
+import math
 import unicodedata
 from collections.abc import Iterable, Mapping
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ExpressionError, ModelError
+from ..errors import ExpressionError, ModelError, ModelWarning, warn_user
 from . import controller_signals
 from .body import GROUND, Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, MaterialPair, check_touching
@@ -17,7 +19,7 @@ from .element import Element, LawOf, Vector, checked_size, fields_with, python_d
 from .event import Event
 from .event_validation import check_event
 from .expression_parser import CONSTANTS, FUNCTIONS, function_name
-from .expressions import Expression, fold_constants, law_expression
+from .expressions import Expression, check_dimension, fold_constants, law_expression
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce, Unilateral
 from .geometry import vector
 from .inertia import checked_shapes, mass_properties
@@ -103,6 +105,18 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
     elif isinstance(e, Initial):
         unit = model.unit(e.name, e)
         resolved_fields(e, env, {"value": unit, "rate": f"{unit}/s"})
+        if unit == "rad" and isinstance(e.value, Real) and _like_degrees(float(e.value)):
+            turns = f"{e.value / (2 * math.pi):.1f} turns"
+            warn_user(f"{e.title}: value {e.value:g} is in rad, {turns}; write '{e.value:g} deg' for degrees, or "
+                      f"'{e.value:g} rad'", ModelWarning)  # fmt: skip
+
+
+FEW_TURNS = 2.0
+
+
+def _like_degrees(angle: float) -> bool:
+    """Return whether an angle is a whole number and more than a few turns: degrees without their unit."""
+    return angle == round(angle) and abs(angle) > FEW_TURNS * 2 * math.pi
 
 
 def resolved_fields(e: Element, env: Mapping[str, float], units: Mapping[str, str]) -> list[Any]:
@@ -261,6 +275,8 @@ def checked_law(
             controller_signals.refuse_unknown(model, expression)
             law_expression(value, of.dimension, where, tables, names)  # parsing refuses curves of other parts
         expression = dataclasses.replace(expression, where=where)
+        if expression.tree.kind == "name":
+            check_dimension(expression.tree.value, model.environment(), of.dimension, f"{where}: ")
         if expression.tree.kind == "number":
             checked_size(expression.tree.value, of.dimension, where)
         sensors = {k: x for k in expression.names if isinstance(x := model.find(k), Sensor)}

@@ -194,7 +194,13 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
     except (TypeError, ValueError):
         raise ModelError(f"outputs must be a number of times, or the times [s] themselves, not {outputs!r}") from None
     if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise ModelError("outputs must be a number of times, or times in ascending order")
+        interval = times.ndim == 0 and 0.0 < times < t_end - t_start
+        remedy = (
+            f"; for one every {float(times):g} s: outputs=np.arange({t_start:g}, {t_end:g}, {float(times):g})"
+            if interval
+            else ""
+        )
+        raise ModelError(f"outputs must be a number of times, or times in ascending order{remedy}")
     if times[0] < t_start or times[-1] > t_end:
         raise ModelError(f"output times must lie between {t_start:g} s and {t_end:g} s")
     return times

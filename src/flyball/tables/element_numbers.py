@@ -84,7 +84,8 @@ def _environment(model: Model, parameters: Mapping[str, Any]) -> tuple[Mapping[s
 
 def _with_bits(env: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
     kind = number_type(env.values())
-    return env, kind, None if kind is object else exact_key(env)
+    units = tuple(getattr(env, "written", {}).items())  # to be checked, also where the numbers are equal
+    return env, kind, None if kind is object else (exact_key(env), units)
 
 
 def _updated(model: Model, env: Mapping[str, Any], key: Hashable) -> ElementNumbers:
@@ -102,6 +103,7 @@ def _updated(model: Model, env: Mapping[str, Any], key: Hashable) -> ElementNumb
         return new  # another thread may have stored others in the meantime
     named = model.cache.get("named", None, 1, lambda: _parameters_of_elements(model))
     other = {k for k, x in env.items() if not _same_bits(x, first.env[k])}
+    other |= {k for k, text in getattr(env, "written", {}).items() if getattr(first.env, "written", {}).get(k) != text}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
     of = _with_needed_elements(model, {**first.of, **{e.name: _checked_fields(e, env) for e in changed}})
     bodies = {
