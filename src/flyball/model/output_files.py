@@ -12,8 +12,15 @@ from typing import BinaryIO
 from ..errors import ModelError, cannot_write
 
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
-PICTURE, DESCRIPTION = (".png", ".svg", ".pdf"), (".toml",)
-OTHER_METHODS = {RESULT: "save", TABLE: "to_csv", PAGE: "to_html", LATEX: "to_latex", PICTURE: "plot(path=...)"}
+PICTURE, DESCRIPTION, SCENE = (".png", ".svg", ".pdf"), (".toml",), (".glb",)
+OTHER_METHODS = {
+    SCENE: "save",
+    RESULT: "save",
+    TABLE: "to_csv",
+    PAGE: "to_html",
+    LATEX: "to_latex",
+    PICTURE: "plot(path=...)",
+}
 """The methods that write files with other extensions."""
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.output_files import PAGE, RESULT, TABLE, file_extension, write_file
+from ..model.output_files import PAGE, RESULT, SCENE, TABLE, file_extension, write_file
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
 from .body_sets import SET_MOTION_ARRAYS, BodySetMotion
@@ -373,7 +373,8 @@ class Result:
     def save(self, path: str | os.PathLike) -> None:
         """Write everything, the model included, to one NetCDF file (.nc); ``flyball.load_result`` reads it back.
 
-        The extension selects the format: .csv and .html are written as by `to_csv` or `to_html`.
+        The extension selects the format: .csv and .html are written as by `to_csv` or `to_html`, .glb is the animated
+        scene in glTF, which slides, Blender and web viewers open.
 
         Raises
         ------
@@ -382,11 +383,16 @@ class Result:
         """
         from .files import save
 
-        found = file_extension(path, (*RESULT, *TABLE, *PAGE))
+        found = file_extension(path, (*RESULT, *TABLE, *PAGE, *SCENE))
         if found in TABLE:
             self.to_csv(path)
         elif found in PAGE:
             self.to_html(path)
+        elif found in SCENE:
+            from ..view.animation import record_motion
+            from ..view.gltf import gltf_scene
+
+            write_file(path, gltf_scene(record_motion(self, curves=False, with_notes=False)), SCENE)
         else:
             save(self, path)
 

@@ -144,7 +144,7 @@ def pack_recording(recording: Recording) -> bytes:
                 "opacity": float(b.opacity),
                 "shapes": [_shape_data(s, block) for s in b.shapes],
             }
-            | {"p": block.add(b.p), "q": block.add(_sign_continuous(b.q))}
+            | {"p": block.add(b.p), "q": block.add(sign_continuous(b.q))}
             for b in recording.bodies
         ],
         "sets": [_set_data(many, block) for many in recording.sets],
@@ -247,7 +247,7 @@ def _contact_data(contacts: RecordedContacts, block: _NumberBlock) -> dict[str, 
     }
 
 
-def _sign_continuous(q: np.ndarray) -> np.ndarray:
+def sign_continuous(q: np.ndarray) -> np.ndarray:
     """Flip signs of quaternions for continuity in time."""
     q = np.asarray(q, float)
     apart = np.einsum("ij,ij->i", q[1:], q[:-1]) < 0

@@ -14,6 +14,8 @@ import numpy as np
 Vector3 = tuple[float, float, float]
 Quaternion4 = tuple[float, float, float, float]
 NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
+BODY_COLORS = ("#2f6fb7", "#e58a2b", "#2a9d83", "#c8465a", "#7d63b8", "#d9b02c", "#58b0d8", "#a2572f")
+"""Colours of bodies without one of their own, in turn, as on the page."""
 
 
 @dataclass(frozen=True)

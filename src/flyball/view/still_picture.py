@@ -23,7 +23,7 @@ from ..tables.structure import structure
 from ..tables.values import values
 from .animation import record_motion
 from .body_shapes import simplify_mesh
-from .recording import RecordedBody, RecordedJoint, RecordedLine, Recording, Shape
+from .recording import BODY_COLORS, RecordedBody, RecordedJoint, RecordedLine, Recording, Shape
 
 CIRCLE_POINTS = 40  # points of a circle
 MAX_STILL_TRIANGLES = 300  # of a mesh
@@ -147,7 +147,6 @@ def _mesh_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
             yield Face(points, _lightness(normal / size), rim=THIN_EDGE)
 
 
-BODY_COLORS = ("#2f6fb7", "#e58a2b", "#2a9d83", "#c8465a", "#7d63b8", "#d9b02c", "#58b0d8", "#a2572f")  # as on the page
 INK_COLOR, GUIDE_COLOR, PAPER_COLOR = "#1d2733", "#8b96a3", "#ffffff"
 PICTURE_WIDTH, PICTURE_HEIGHT, PICTURE_MARGIN = 420.0, 280.0, 24.0  # [px]
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(22.0)  # view direction of spatial mechanisms
