@@ -67,7 +67,7 @@ def shape_surface(shape: Shape) -> Surface:
 
 
 def _revolved(profiles: Sequence[np.ndarray]) -> Surface:
-    """Surface of revolution about z. Each profile has rows (radius, z, radial and axial part of the normal), upwards."""
+    """Surface of revolution about z. Profiles have rows (radius, z, radial and axial part of the normal), upwards."""
     a = np.linspace(0.0, 2.0 * np.pi, ROUND + 1)
     vertices, normals, triangles = [], [], []
     first = 0
