@@ -13,8 +13,10 @@ from ..errors import ModelError, cannot_write
 
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
 PICTURE, DESCRIPTION, SCENE = (".png", ".svg", ".pdf"), (".toml",), (".glb",)
+VIDEO = (".gif", ".mp4", ".webm")
 OTHER_METHODS = {
     SCENE: "save",
+    VIDEO: "save",
     RESULT: "save",
     TABLE: "to_csv",
     PAGE: "to_html",

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.output_files import PAGE, RESULT, SCENE, TABLE, file_extension, write_file
+from ..model.output_files import PAGE, RESULT, SCENE, TABLE, VIDEO, file_extension, write_file
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
 from .body_sets import SET_MOTION_ARRAYS, BodySetMotion
@@ -374,7 +374,7 @@ class Result:
         """Write everything, the model included, to one NetCDF file (.nc); ``flyball.load_result`` reads it back.
 
         The extension selects the format: .csv and .html are written as by `to_csv` or `to_html`, .glb is the animated
-        scene in glTF, which slides, Blender and web viewers open.
+        scene in glTF, which slides, Blender and web viewers open; .gif, .mp4 and .webm are videos as by `to_video`.
 
         Raises
         ------
@@ -383,11 +383,13 @@ class Result:
         """
         from .files import save
 
-        found = file_extension(path, (*RESULT, *TABLE, *PAGE, *SCENE))
+        found = file_extension(path, (*RESULT, *TABLE, *PAGE, *SCENE, *VIDEO))
         if found in TABLE:
             self.to_csv(path)
         elif found in PAGE:
             self.to_html(path)
+        elif found in VIDEO:
+            self.to_video(path)
         elif found in SCENE:
             from ..view.animation import record_motion
             from ..view.gltf import gltf_scene
@@ -423,6 +425,21 @@ class Result:
             If the file cannot be written, or there is nothing to draw.
         """
         write_file(path, self.html(**options), PAGE)
+
+    def to_video(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the animation as a video: .gif, or .mp4 and .webm, which need the program ffmpeg.
+
+        Options are ``speed`` (seconds of motion in a second of video; by default real time, or a round factor for short
+        and long motions), ``frames_per_second`` and ``width`` [px].
+
+        Raises
+        ------
+        ModelError
+            If the file cannot be written, or ffmpeg is not installed.
+        """
+        from ..view.video import save_video
+
+        save_video(self, path, **options)
 
     def report(self, **options: Any) -> str:
         """The report as text: summary, animation, plots, tables of the model, and its file. Options as for `html`."""

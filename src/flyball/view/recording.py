@@ -7,7 +7,7 @@ Objects fixed on a body (or on ``"ground"``) are given in the axes of that body,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,18 @@ class Shape:
     vertices: np.ndarray | None = None
     triangles: np.ndarray | None = None
     hole: bool = False
+
+
+def scaled_shape(shape: Shape, factor: float) -> Shape:
+    """Return a shape enlarged about the body's origin."""
+    x, y, z = shape.position
+    return replace(
+        shape,
+        size=tuple(factor * x for x in shape.size),
+        position=(factor * x, factor * y, factor * z),
+        outline=tuple((factor * x, factor * y) for x, y in shape.outline),
+        vertices=None if shape.vertices is None else factor * np.asarray(shape.vertices),
+    )
 
 
 def half_extent(shape: Shape) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator
+from dataclasses import replace
 from html import escape
 from typing import NamedTuple
 
@@ -23,7 +24,15 @@ from ..tables.structure import structure
 from ..tables.values import values
 from .animation import record_motion
 from .body_shapes import simplify_mesh
-from .recording import BODY_COLORS, RecordedBody, RecordedJoint, RecordedLine, Recording, Shape
+from .recording import (
+    BODY_COLORS,
+    RecordedBody,
+    RecordedJoint,
+    RecordedLine,
+    Recording,
+    Shape,
+    scaled_shape,
+)
 
 CIRCLE_POINTS = 40  # points of a circle
 MAX_STILL_TRIANGLES = 300  # of a mesh
@@ -79,9 +88,9 @@ def _shape_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
         yield from _plate_faces(shape, turn) if shape.kind == "plate" else _mesh_faces(shape, turn)
     elif shape.kind in ("sphere", "ellipsoid"):
         half = np.array(shape.size if shape.kind == "ellipsoid" else shape.size * 3)
-        up = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 15)
-        rings = [circle_points(np.cos(u), np.sin(u)) for u in up]
-        yield _silhouette(np.concatenate(rings) * half @ turn.T)
+        flat = turn[:2] * half  # x = turn half u with |u| = 1 is seen as the ellipse L u, L L^T = flat flat^T
+        outline = circle_points(1.0)[:, :2] @ np.linalg.cholesky(flat @ flat.T).T
+        yield Face(np.column_stack([outline, np.zeros(len(outline))]))
     elif shape.kind == "capsule":
         radius, length = shape.size
         ends = np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]]) @ turn.T
@@ -136,10 +145,17 @@ def _plate_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
     yield Face(both[int(toward > 0.0)], 0.15, thick)
 
 
-def _mesh_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
-    assert shape.vertices is not None
+def coarse_shape(shape: Shape) -> Shape:
+    """Return a mesh with few triangles; other shapes unchanged."""
+    if shape.kind != "mesh" or len(np.asarray(shape.triangles)) <= MAX_STILL_TRIANGLES:
+        return shape
     v, triangles = simplify_mesh(np.asarray(shape.vertices), np.asarray(shape.triangles), MAX_STILL_TRIANGLES)
-    corners = (v @ turn.T)[triangles]
+    return replace(shape, vertices=v, triangles=triangles)
+
+
+def _mesh_faces(shape: Shape, turn: np.ndarray) -> Iterator[Face]:
+    shape = coarse_shape(shape)
+    corners = (np.asarray(shape.vertices) @ turn.T)[np.asarray(shape.triangles)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sizes = np.sqrt((normals**2).sum(axis=1))
     for points, normal, size in zip(corners, normals, sizes, strict=True):
@@ -170,8 +186,7 @@ class Stroke(NamedTuple):
 
 def still_svg(recording: Recording) -> str:
     """Return the picture of the first time of a recording, as the text of an SVG element."""
-    eye = _view_axes(recording.planar)
-    drawn = list(_all_strokes(recording, eye))
+    drawn = scene_strokes(recording)
     if not drawn:
         return ""
     every = np.concatenate([s.points for s in drawn])
@@ -184,8 +199,7 @@ def still_svg(recording: Recording) -> str:
     def placed(p: np.ndarray) -> np.ndarray:
         return np.array([PICTURE_WIDTH, height]) / 2 + (p - middle) * scale * [1.0, -1.0]
 
-    back_to_front = sorted(drawn, key=lambda s: (bool(s.pin) and recording.planar, round(s.depth, 9)))
-    body = "".join(_stroke_svg(s, placed(s.points)) for s in back_to_front)
+    body = "".join(_stroke_svg(s, placed(s.points)) for s in drawn)
     title = escape(f"{recording.name} in the reference configuration")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" '
@@ -205,10 +219,16 @@ def _view_axes(planar: bool) -> np.ndarray:
     return np.array([right, np.cross(toward, right), toward])
 
 
-def _all_strokes(recording: Recording, eye: np.ndarray) -> Iterator[Stroke]:
+def scene_strokes(recording: Recording, at: int = 0) -> list[Stroke]:
+    """Return what is drawn of the scene at one of its times, from back to front."""
+    drawn = _all_strokes(recording, _view_axes(recording.planar), at)
+    return sorted(drawn, key=lambda s: (bool(s.pin) and recording.planar, round(s.depth, 9)))
+
+
+def _all_strokes(recording: Recording, eye: np.ndarray, at: int) -> Iterator[Stroke]:
     poses = {GROUND: (np.zeros(3), np.eye(3))}
     for k, body in enumerate(recording.bodies):
-        poses[body.name] = body.p[0], quaternion_to_matrix(body.q[0])
+        poses[body.name] = body.p[at], quaternion_to_matrix(body.q[at])
         layer = 1e-6 * k * recording.size if recording.planar else 0.0
         for stroke in _body_strokes(body, eye, BODY_COLORS[k % len(BODY_COLORS)], *poses[body.name]):
             yield stroke._replace(depth=stroke.depth + layer)
@@ -217,7 +237,15 @@ def _all_strokes(recording: Recording, eye: np.ndarray) -> Iterator[Stroke]:
         seen = (p + curve.points @ R.T) @ eye.T
         yield Stroke(seen[:, :2], float(seen[:, 2].mean()), closed=curve.closed)
     for line in recording.lines:
-        yield _line_stroke(line, eye, recording.size)
+        yield _line_stroke(line, eye, recording.size, at)
+    for many in recording.sets:
+        for k, (p, q) in enumerate(zip(many.p[at], many.q[at], strict=True)):
+            if np.isfinite(p).all():
+                size = 1.0 if many.scale is None else float(many.scale[k])
+                shapes = many.shapes if size == 1.0 else tuple(scaled_shape(s, size) for s in many.shapes)
+                member = RecordedBody(many.name, shapes, p[None], q[None])
+                color = (many.colors or BODY_COLORS)[k % len(many.colors or BODY_COLORS)]
+                yield from _body_strokes(member, eye, color, p, quaternion_to_matrix(q))
     for joint in recording.joints:
         yield from _joint_strokes(joint, eye, recording.size, *poses[joint.body])
 
@@ -240,9 +268,9 @@ def _face_color(color: str, face: Face) -> str:
     return "#" + "".join(f"{round(c):02x}" for c in rgb + part * (other - rgb))
 
 
-def _line_stroke(line: RecordedLine, eye: np.ndarray, size: float) -> Stroke:
+def _line_stroke(line: RecordedLine, eye: np.ndarray, size: float, time: int) -> Stroke:
     """Return a spring as a zigzag, anything else as a line."""
-    seen = np.array([p[0] for p in line.points]) @ eye.T
+    seen = np.array([p[time] for p in line.points]) @ eye.T
     points, depth = seen[:, :2], float(seen[:, 2].mean())
     if line.kind == "spring":
         d = points[-1] - points[0]
