@@ -45,7 +45,7 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
         return save(self, path)
 
     def _repr_html_(self) -> str:
-        from .view.still_picture import mechanism_html
+        from .view.reference_picture import mechanism_html
 
         return mechanism_html(self)
 

@@ -15,7 +15,8 @@ import pytest
 import flyball as fb
 from flyball.view.animation import record_motion
 from flyball.view.recording import Recording
-from flyball.view.still_picture import BODY_COLORS, convex_polygon, reference_result, still_svg
+from flyball.view.reference_picture import reference_result
+from flyball.view.still_picture import BODY_COLORS, convex_polygon, still_svg
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
 SVG = "{http://www.w3.org/2000/svg}"

@@ -55,9 +55,9 @@ def test_a_gif_has_its_pictures(tmp_path):
 
 def test_sets_of_bodies_are_drawn(tmp_path):
     m = fb.Mechanism("balls", gravity=(0, 0, -9.81))
-    places = [(x, 0, 1) for x in range(3)]
+    places = [(x, 0.0, 1.0) for x in (0.0, 1.0, 2.0)]
     m.add(fb.Bodies("balls", position=places, shape=fb.Sphere(radius=0.2), density=1000))
-    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact("touch"))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact("touch", friction=0.5))
     m.simulate(0.1, outputs=3).to_video(tmp_path / "a.gif", speed=0.1, frames_per_second=3, width=200)
     with Image.open(tmp_path / "a.gif") as film:
         assert len(np.unique(np.array(film.convert("RGB")).reshape(-1, 3), axis=0)) > 4

@@ -1,11 +1,7 @@
-"""Still pictures as SVG: the first time of a recording in polygons and lines; a mechanism in a notebook.
-
-The reference configuration is drawn without assembling or compiling anything.
-"""
+"""Still pictures: a scene in polygons and lines at one of its times, from back to front, and as SVG."""
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator
 from dataclasses import replace
 from html import escape
@@ -13,16 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import FlyballError
 from ..model.body import GROUND
 from ..model.geometry import quaternion_to_matrix
-from ..model.messages import summary
-from ..model.model import Model
-from ..results.health import Health
-from ..results.result import Result
-from ..tables.structure import structure
-from ..tables.values import values
-from .animation import record_motion
 from .body_shapes import simplify_mesh
 from .recording import (
     BODY_COLORS,
@@ -335,38 +323,3 @@ def _pin_svg(pin: str, x: float, y: float) -> str:
         f'<path d="{path}" fill="#e9edf1" stroke="{INK_COLOR}" stroke-width="1.2"/>'
         f'<path d="{ticks}" fill="none" stroke="{GUIDE_COLOR}" stroke-width="1.1"/>'
     )
-
-
-def mechanism_html(model: Model) -> str:
-    """The parts of a mechanism and a picture of the reference configuration, for ``_repr_html_``; nothing is compiled.
-
-    An incomplete description that cannot be drawn yet is shown without a picture; analyses report its errors.
-    """
-    text = f'<pre style="line-height:1.35;overflow-x:auto">{html.escape(summary(model))}</pre>'
-    try:
-        with np.errstate(all="ignore"):
-            picture = still_svg(record_motion(reference_result(model), curves=False, with_notes=False))
-    except (FlyballError, ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError):
-        picture = ""
-    return f"<div>{picture}{text}</div>"
-
-
-# The reference configuration, read like any result, for pictures before anything is computed.
-
-
-def reference_result(model: Model) -> Result:
-    """Return the reference configuration, at rest and without loads, as a result with one time.
-
-    Nothing is assembled or compiled: bodies have their described poses, joints may be open.
-
-    Raises
-    ------
-    ModelError
-        If the description cannot be made into tables.
-    """
-    model = model.snapshot()
-    x = values(structure(model), model.environment())
-    s = x.structure
-    still, loads = np.zeros((1, s.nv)), np.zeros((1, len(s.rows) + len(s.prescribed)))
-    health = Health(True, "as drawn", 0.0, 0.0, 0, 0, 0, 0, 0.0)
-    return Result(model, x, np.zeros(1), x.q[None], still, np.zeros((1, len(s.states))), still, loads, health)
