@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 
 TEXTS_VARIABLE, NUMBERS_VARIABLE = "texts", "numbers"
+ROWS_AT_ONCE = 4096  # rows of a table whose numbers are Python objects at the same time
 MAX_CONCATENATED = 1 << 20  # size of arrays that are combined before writing
 
 
@@ -319,8 +320,9 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
     """Write all curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
     channels = result.channels()
     header = [f"{TIME_LABEL} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
-    columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
-    write_table(path, header, zip(*columns, strict=True))
+    columns = [result.t, *(np.asarray(v) for _, v in channels.values())]
+    parts = (slice(k, k + ROWS_AT_ONCE) for k in range(0, len(result.t), ROWS_AT_ONCE))
+    write_table(path, header, (row for at in parts for row in zip(*(x[at].tolist() for x in columns), strict=True)))
 
 
 def write_table(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
