@@ -13,10 +13,12 @@ from flyball.constraints import (
     curve,
     displacement,
     distance,
+    inclination,
     knife_edge,
     perpendicular,
     relative_spin,
     rolling,
+    rotation_component,
     skew_lines,
 )
 from flyball.constraints.registry import KINDS
@@ -51,6 +53,9 @@ PARAMETERS = {
     },
     knife_edge.KIND: {"": AXES},
     relative_spin.KIND: {"": AXES},
+    inclination.KIND_ANGLE: {"angle": AXES},
+    inclination.KIND_ELEVATION: {"elevation": AXES},
+    rotation_component.KIND: {"": AXES},
 }
 CASES = [(kind, name) for kind, sets in PARAMETERS.items() for name in sets]
 WORLD = (coincident.KIND, skew_lines.KIND)  # they speak of an axis of the world, not of their frames

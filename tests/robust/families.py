@@ -9,8 +9,8 @@ from typing import Any
 import flyball as fb
 
 from .dice import Dice, plus
-from .forces import FORCES, driven
-from .joints import coordinates, coupling, joint
+from .forces import FORCES, driven, law, stiffness
+from .joints import coordinates, coupling, joint, rotations
 from .shaken import MAKERS, noted
 from .stiffened import stiffened
 from .switching import switched
@@ -231,6 +231,29 @@ def drivers(d: Dice) -> Case:
     return case
 
 
+def orientations(d: Dice) -> Case:
+    """Ball joints and bodies whose angles are driven, stopped, sprung and read by laws, singular positions included."""
+    case, m = _case(d, "orientations", 0.5)
+    tree(d, m, case, d.whole(1, 3), kinds=["Revolute"] if d.planar else ["Spherical", "Spherical", "Revolute"])
+    found = [f"{b.name}.angle" for b in m.bodies] if d.planar else rotations(m)
+    for k in range(d.whole(1, 3)):
+        c = d.pick(found)
+        case.add(lambda k=k, c=c: fb.Sensor(f"s{k}", c))
+        make = d.pick(
+            [
+                lambda k=k, c=c: fb.CoordinateSpring(
+                    f"F{k}", c, stiffness=stiffness(d, False), damping=d.pick([0, 0.1])
+                ),
+                lambda k=k, c=c: fb.Actuator(f"F{k}", c, force=law(d, m, 1.0, ("value", "rate"))),
+                lambda k=k, c=c: fb.Limit(f"F{k}", c, upper=d.number(0.05, 1.0), stiffness=d.pick([None, 100.0])),
+                lambda k=k, c=c: fb.Driver(f"D{k}", c, driven(d)),
+                lambda k=k, c=c: fb.Event(f"E{k}", f"t > {d.number(0.1, 0.4)}", do=[fb.Lock(c)]),
+            ]
+        )
+        case.add(make)
+    return case
+
+
 def couplings(d: Dice) -> Case:
     case, m = _case(d, "couplings", 0.5)
     tree(d, m, case, d.whole(2, 5), kinds=["Revolute", "Prismatic", "Cylindrical"][: 2 if d.planar else 3])
@@ -329,7 +352,7 @@ def shaken(d: Dice) -> Case:
 FAMILIES = {
     f.__name__: f
     for f in (
-        chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, stiff, drivers, couplings, friction,
+        chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, stiff, drivers, orientations, couplings, friction,
         crowds, stops, sticking, ropes, latches, happenings, shaken,
     )
 }  # fmt: skip

@@ -117,9 +117,15 @@ def joint(d: Dice, name: str, i: str, j: str, p, kinds=None):
 
 
 def coordinates(m: fb.Mechanism, ending: str = "") -> list[str]:
-    """Names of all joint coordinates, or of those with this ending."""
-    found = [f"{j.name}.{c}" for j in m.joints for c in j.measured(m.planar)]
+    """Names of all joint coordinates without singular positions, or of those with this ending."""
+    found = [f"{j.name}.{c}" for j in m.joints for c in j.independent(m.planar)]
     return [c for c in found if c.endswith(ending)]
+
+
+def rotations(m: fb.Mechanism) -> list[str]:
+    """Names of the coordinates that have singular positions: of ball joints, of bodies in space."""
+    owners = [*m.joints, *m.bodies]
+    return [f"{e.name}.{k}" for e in owners for k, c in e.measured(m.planar).items() if c.singular]
 
 
 def coupling(d: Dice, m: fb.Mechanism, name: str):

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..constraints import angle, rotation_component
+from ..constraints.inclination import KIND_ELEVATION
 from ..engine.kinematics import load_record
 from ..engine.rows import row_parameters
 from ..errors import AssemblyError
@@ -18,6 +20,7 @@ from ..model.body import Body, Driver, Frame
 from ..model.element import LawOf
 from ..model.expressions import Expression, number
 from ..model.geometry import quaternion_to_matrix, rotation_about
+from ..model.joint import Joint
 from ..model.model import Model
 from ..results.health import InitialDeviation
 from ..results.wording import tuple_text
@@ -73,23 +76,44 @@ def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
 
 
 def undefined_row(c: CompiledMechanism) -> str:
-    """Return a message on a user-defined constraint row that is not finite at the present kinematics; empty if there is
-    none.
+    """Return a message on a constraint row that is not finite at the present kinematics; empty if there is none.
+
+    It is user-defined, or that of a coordinate at a singular position.
     """
     s, S, W = c.structure, c.values.system, c.work
     for k, t in enumerate(s.terms):
-        if s.term_code[k] is None:
+        singular = t.owner is not None and t.owner.coordinates[t.what].singular
+        if s.term_code[k] is None and not singular:
             continue
         par, F, M = row_parameters(S.term_parameters, k), load_record(W.FK, t.F), load_record(W.FK, t.M)
         with np.errstate(all="ignore"):
             row = t.formula.of_kind.row(par, F, M, 0.0, S.const)
-        if not np.isfinite(np.hstack(row)).all():
+        finite = np.isfinite(np.hstack(row)).all()
+        if singular and (not finite or _angle_to_singular(t, F, M) < NEAR_SINGULAR):
+            return f"{t.owner.name}.{t.what}, which {t.element.title} uses, is {singular}. {OTHER_COORDINATES}"
+        if not finite:
             named = ", ".join(f"{name} {np.array(x)}" for name, x in zip(ROW_PARTS, row, strict=True))
             return (
                 f"{type(t.formula).__name__}.row of {t.element.title} is not finite for par = {np.array(par[:6])} with "
                 f"its frames at {np.array(F[0])} m and {np.array(M[0])} m: {named}"
             )
     return ""
+
+
+NEAR_SINGULAR = 0.02  # [rad] from a singular position: to this a fault there is attributed
+OTHER_COORDINATES = (
+    "Use another of its coordinates there, or frames whose axes are turned so that the motion keeps away from it"
+)
+
+
+def _angle_to_singular(t: Any, F: tuple, M: tuple) -> float:
+    """Return the angle [rad] of a coordinate of a rotation from its singular positions, for small ones."""
+    f, m = np.reshape(F[1], (3, 3)), np.reshape(M[1], (3, 3))
+    if t.formula.kind == rotation_component.KIND:
+        return float(np.pi - np.arccos(np.clip(0.5 * (np.sum(f * m) - 1.0), -1.0, 1.0)))
+    if t.formula.kind == angle.KIND:
+        return float(np.linalg.norm(f[:, :2].T @ m[:, 0]))
+    return float(np.linalg.norm(np.cross(f[:, 2], m[:, 0]))) if t.formula.kind == KIND_ELEVATION else np.inf
 
 
 def _gap_text(metres: float, radians: float, length: float) -> str:
@@ -369,10 +393,8 @@ def initial_turn_angles(c: CompiledMechanism, known: Mapping[str, float]) -> dic
     out = {}
     for name in set(known) & set(c.structure.state_at):
         joint, what = c.structure.model.coordinate(name, c.structure.model.bodies[0])
-        coordinate = joint.coordinates[what] if hasattr(joint, "coordinates") else None
-        sign = coordinate.sign if coordinate else 1.0
-        offset = joint.offset(c.values.numbers[joint.name], what) if coordinate else 0.0
-        out[name] = sign * (known[name] - offset)
+        offset = joint.offset(c.values.numbers[joint.name], what) if isinstance(joint, Joint) else 0.0
+        out[name] = joint.coordinates[what].sign * (known[name] - offset)
     return out
 
 

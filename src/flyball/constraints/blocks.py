@@ -17,10 +17,12 @@ from . import (
     curve,
     displacement,
     distance,
+    inclination,
     knife_edge,
     perpendicular,
     relative_spin,
     rolling,
+    rotation_component,
     skew_lines,
 )
 from .registry import BY_ADDRESS, KINDS, Kind
@@ -143,6 +145,18 @@ CONSTANT_DISTANCE = (Row(distance.KIND, (0.0,) * 7 + (1.0,)),)
 
 ANGLE = Row(angle.KIND, (0.0,) * 7 + (1.0,), measure="rad")
 """Coordinate: angle of M's x axis about F's z axis."""
+
+PITCH = _row(inclination.KIND_ELEVATION, "z", "x", measure="rad")
+"""Coordinate: angle of M's x axis below F's x-y plane."""
+
+DEFLECTION = _row(inclination.KIND_ANGLE, "z", "z", measure="rad")
+"""Coordinate: angle between the z axes of F and M."""
+
+
+def rotation_along(axis: str) -> Row:
+    """Coordinate: component along an axis of F of the rotation vector from F to M."""
+    return _row(rotation_component.KIND, axis, measure="rad")
+
 
 SLIDE = _row(displacement.KIND, "z")
 """Coordinate: displacement of M along F's z axis."""

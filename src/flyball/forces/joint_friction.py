@@ -203,7 +203,13 @@ class JointFriction(CoordinateForce):
         if self.coordinate == THREAD:
             self._examine_thread(model)
             return
-        joint = model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
+        what = self.coordinate_text().partition(".")[2]
+        joint = model.joint(self.joint, self, what)
+        if joint.coordinates[what].singular:
+            raise ModelError(
+                f"{self.title}: friction is opposite to a slip, and the rate of {self.coordinate_text()!r} is none: "
+                f"all rotations of {joint.title} slip on one surface. Use a Bushing with torsional_damping="
+            )
         for other in self._other_directions(model):
             if joint.one_surface:
                 raise ModelError(self._rectangle(other, joint))

@@ -319,11 +319,11 @@ def _drive(result: Result, driver: Driver) -> Drive:
     model = result.model
     owner, what = model.coordinate(driver.coordinate, driver)
     view = result[owner.name]
-    if not isinstance(owner, (Body, Frame)):
-        rate = getattr(view, f"{what}_rate")
-    elif what == "angle":
+    if what == "angle" and isinstance(owner, (Body, Frame)):
         rate = view.angular_velocity
-    else:
+    elif what in ("x", "y", "z") and isinstance(owner, (Body, Frame)):
         rate = view.velocity[:, "xyz".index(what)]
+    else:
+        rate = getattr(view, f"{what}_rate")
     unit, effort = result[driver.name].quantity("effort")
     return Drive(driver.name, driver.coordinate, unit, np.asarray(effort), np.asarray(rate))

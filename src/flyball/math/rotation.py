@@ -35,19 +35,40 @@ def rotation_vector(R):
 
 
 @formula
+def log_curvature(t2):
+    """k = 1/t^2 - (1 + cos t) / (2 t sin t) and dk/d(t^2) for the square of an angle t [rad] below a turn.
+
+    With h = t/2: k = (1 - h cot h) / t^2 and dk/d(t^2) = ((h / sin^2 h - cot h) / (8 h) - k) / t^2.
+    """
+    far = t2 - SMALL_ANGLE_SQUARE
+    half = 0.5 * sqrt(choose(far, t2, 1.0 + t2))
+    s = sin(half)
+    k = (1.0 - half * cos(half) / s) / (4.0 * half * half)
+    slope = ((half / s - cos(half)) / (8.0 * half * s) - k) / (4.0 * half * half)
+    near = 1.0 / 12.0 + t2 * (1.0 / 720.0 + t2 / 30240.0)
+    near_slope = 1.0 / 720.0 + t2 * (1.0 / 15120.0 + t2 / 403200.0)
+    return choose(far, k, near), choose(far, slope, near_slope)
+
+
+@formula
 def log_gradient(theta, a):
     """J^T a, where thetadot = J omega and omega is the angular velocity in the axes that theta starts from.
 
     J = 1 - [theta]/2 + k [theta]^2, so J^T a = a + theta x a / 2 + k theta x (theta x a), with
-    k = 1/t^2 - (1 + cos t) / (2 t sin t) (Bullo and Murray, 1995).
+    k = 1/t^2 - (1 + cos t) / (2 t sin t) (Bullo and Murray, 1995). J a is the same of -theta.
     """
-    t2 = dot(theta, theta)
-    far = t2 - SMALL_ANGLE_SQUARE
-    half = 0.5 * sqrt(choose(far, t2, 1.0 + t2))
-    series = 1.0 / 12.0 + t2 * (1.0 / 720.0 + t2 / 30240.0)
-    k = choose(far, (1.0 - half * cos(half) / sin(half)) / (4.0 * half * half), series)
+    k, _ = log_curvature(dot(theta, theta))
     across = cross(theta, a)
     return add(a, add(scale(0.5, across), scale(k, cross(theta, across))))
+
+
+@formula
+def log_gradient_rate(theta, rate, a):
+    """Rate of J^T a (`log_gradient`) for a constant a, where theta has this rate."""
+    k, slope = log_curvature(dot(theta, theta))
+    across, moved = cross(theta, a), cross(rate, a)
+    bend = add(cross(rate, across), cross(theta, moved))
+    return add(scale(0.5, moved), add(scale(2.0 * slope * dot(theta, rate), cross(theta, across)), scale(k, bend)))
 
 
 LEAST_SCALAR_PART = 1e-150  # smallest scalar part of a quaternion; it stands for half a turn

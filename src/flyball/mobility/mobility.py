@@ -80,7 +80,7 @@ def _candidate_coordinates(a: Assembly) -> tuple[list[str], Any]:
     model = own.structure.model
     depth = _joint_distances(model)
     joints = sorted(model.joints, key=lambda j: _joint_distance(depth, model, j))
-    names = [f"{j.name}.{what}" for j in joints for what in j.measured(model.planar)]
+    names = [f"{j.name}.{what}" for j in joints for what in j.independent(model.planar)]
     axes = ("angle", "x", "y") if model.planar else ("x", "y", "z")
     names += [f"{b.name}.{what}" for b in model.bodies for what in axes]
     measuring = model.copy()

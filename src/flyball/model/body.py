@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator
 
+from ..constraints.blocks import ANGLE, point_coordinate
 from ..errors import ModelError
 from ..math.vec import quaternion_matrix
 from ..rotations.arrays import unit_quaternions
@@ -36,6 +37,7 @@ from .element import (
 )
 from .geometry import Orientation, orientation_matrix, rotation_about
 from .inertia import MassProperties, mass_properties
+from .joint import ORIENTATION_ANGLES, Coordinate
 from .shapes import Solid
 from .shapes.mesh import current_folder
 
@@ -105,8 +107,27 @@ def shape_tuple(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
     return shape if isinstance(shape, tuple) else (shape,)
 
 
+class Located(Element):
+    """What has a reference frame that may move: its coordinates are measured from the world's frame."""
+
+    coordinates: ClassVar[dict[str, Coordinate]] = {
+        **{a: Coordinate(point_coordinate(a)) for a in "xyz"},
+        "angle": Coordinate(ANGLE),
+        **ORIENTATION_ANGLES,
+    }
+
+    def ends(self) -> dict[str, str]:
+        """Return the reference frame."""
+        return {"M": self.name}
+
+    def measured(self, planar: bool) -> dict[str, Coordinate]:
+        """Return its coordinates: in the plane x, y, angle; in space x, y, z, roll, pitch, yaw."""
+        names = ("x", "y", "angle") if planar else ("x", "y", "z", *ORIENTATION_ANGLES)
+        return {k: self.coordinates[k] for k in names}
+
+
 @element
-class Body(Element):
+class Body(Located):
     """A rigid body.
 
     Its reference frame is given by ``position`` and ``angle`` (planar) or ``orientation`` (spatial) in the drawn
@@ -193,10 +214,6 @@ class Body(Element):
         if self.color is not None:
             check_color(self.color, self.title)
 
-    def ends(self) -> dict[str, str]:
-        """Return the reference frame."""
-        return {"M": self.name}
-
     def shapes(self) -> tuple[Solid, ...]:
         """Return its shapes, as a tuple."""
         return shape_tuple(self.shape)
@@ -213,7 +230,7 @@ class Body(Element):
 
 
 @element
-class Frame(Element):
+class Frame(Located):
     """A frame fixed on a body or on ground: joints, forces and sensors may attach to it by name.
 
     Parameters
@@ -236,19 +253,27 @@ class Frame(Element):
 
     category: ClassVar[str] = "frames"
     rotation = Body.rotation
-    ends = Body.ends
 
 
 @element
 class Driver(Element):
     """A coordinate that follows a prescribed function of time (a rheonomic constraint).
 
+    Drivers of ``x``, ``y``, ``z``, ``roll``, ``pitch``, ``yaw`` of a frame (in the plane ``x``, ``y``, ``angle``)
+    prescribe its whole motion. Angles are those of R = R_z(yaw) R_y(pitch) R_x(roll), with whole turns of roll and yaw;
+    a motion through a pitch of 90 deg is refused there: describe it from a `Frame` with other axes.
+
+    Its ``effort`` does the power effort times rate on the mechanism: for ``x`` the force along x at the frame's origin;
+    for ``yaw``, ``pitch``, ``roll`` driven together the components of their total torque along the world's z axis, the
+    axis of pitch (square to that and the frame's x axis), and the frame's x axis. Any of these angles driven alone has
+    a torque square to the other two of these axes.
+
     Parameters
     ----------
     name : str
     coordinate : str
-        ``"joint.coordinate"`` such as ``"A.angle"``, or a world coordinate of a body's or frame's origin such as
-        ``"slider.x"``.
+        ``"joint.coordinate"`` such as ``"A.angle"``; or of a body or frame ``x``, ``y``, ``z`` of its origin in the
+        world, and ``roll``, ``pitch``, ``yaw`` (in the plane ``angle``) of its axes: ``"slider.x"``.
     law : expression
         Its value [rad] or [m], an expression of ``t``, tables, parameters, and sensors of positions and angles; its
         derivatives are exact. Python functions are not permitted, since their derivatives are unknown.

@@ -57,7 +57,7 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
         return LockTarget((a.what,))
     found = model.find(a.what)
     if isinstance(found, Joint):
-        own = tuple(f"{a.what}.{k}" for k in found.measured(model.planar))
+        own = tuple(f"{a.what}.{k}" for k in found.locked(model.planar))
         if own and (isinstance(a, Lock) or _locked_somewhere(model, e, {a.what, *own})):
             return LockTarget(own)
         if not found.rows(model.planar):
@@ -71,11 +71,11 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
             f"{what}: there is no part named {a.what!r}{suggest(a.what, known)}; "
             f"name a joint, a coordinate such as 'A.angle', a limit or a rope"
         )
-    if found.category in ("bodies", "frames"):
-        axes = "x, y, angle" if model.planar else "x, y, z"
+    if isinstance(found, (Body, Frame)):
+        own = tuple(found.measured(model.planar))
         raise ModelError(
-            f"{what}: {found.title} has the coordinates {axes}; name one, as in '{a.what}.x', or fix it with a Fixed "
-            "joint that another event releases"
+            f"{what}: {found.title} has the coordinates {', '.join(own)}; name one, as in '{a.what}.x', or fix it "
+            "with a Fixed joint that another event releases"
         )
     raise ModelError(
         f"{what}: {found.title} is no joint, coordinate, limit or rope; a force is switched off by fb.Set of a "

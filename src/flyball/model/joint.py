@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..constraints.blocks import Row
+from ..constraints.blocks import ANGLE, PITCH, Row
 from ..errors import ModelError
 from .element import Direction, Element, Point
 from .geometry import triad, vector
@@ -35,11 +35,23 @@ class Coordinate:
     turn_M: tuple = ()
     sign: float = 1.0
     offset: str = ""  # field with its value in the drawn configuration
+    singular: str = ""  # of one of several descriptions of one rotation: where it is undefined
 
     @property
     def unit(self) -> str:
         """Unit of its value."""
         return self.row.measure
+
+
+X_AND_Z = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+"""Rotation of a frame that exchanges its x and z axes."""
+GIMBAL_LOCK = "at a pitch of 90 deg, where roll and yaw are undefined"
+ORIENTATION_ANGLES = {
+    "roll": Coordinate(ANGLE, "MF", turn_F=Z_TO_X, turn_M=X_AND_Z, sign=-1.0, singular=GIMBAL_LOCK),
+    "pitch": Coordinate(PITCH, singular=GIMBAL_LOCK),
+    "yaw": Coordinate(ANGLE, singular=GIMBAL_LOCK),
+}
+"""Roll, pitch, yaw of M in F: R_FM = R_z(yaw) R_y(pitch) R_x(roll), as of vehicles (ISO 8855) and URDF."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +151,14 @@ class Joint(Element):
         if not planar:
             return self.coordinates
         return {k: c for k, c in self.coordinates.items() if self.planar_normal not in c.row.axes or not c.row.axes}
+
+    def independent(self, planar: bool) -> list[str]:
+        """Return the names of its coordinates but those that are one of several descriptions of one rotation."""
+        return [k for k, c in self.measured(planar).items() if not c.singular]
+
+    def locked(self, planar: bool) -> list[str]:
+        """Return the names of the coordinates that are locked together to prevent all its relative motions."""
+        return self.independent(planar)
 
     def offset(self, n: SimpleNamespace, coordinate: str) -> float:
         """Return the value of a coordinate in the drawn configuration."""

@@ -302,7 +302,7 @@ class Model:
         owner, _, what = text.partition(".")
         found = self.by_name.get(owner)
         if isinstance(found, (Body, Frame)):
-            axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
+            axes = found.measured(self.planar)
             if what not in axes:
                 raise ModelError(
                     f"{e.title}: {field_with(e, text)}{owner!r} has the coordinates {', '.join(axes)}, not {what!r}"
@@ -356,9 +356,7 @@ class Model:
     def unit(self, text: str, e: Element) -> str:
         """Return the unit of a coordinate."""
         owner, what = self.coordinate(text, e)
-        if isinstance(owner, Joint):
-            return owner.coordinates[what].unit
-        return "rad" if what == "angle" else "m"
+        return owner.coordinates[what].unit
 
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True) -> Any:
         """Return a law as an expression of t, its inputs, sensors, tables and parameters; refuse other names.

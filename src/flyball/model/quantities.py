@@ -20,7 +20,7 @@ from .element import Element, LawOf, Unit, fields_with
 from .event import Lock
 from .expressions import law_expression, number
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
-from .joint import Coupling, Joint
+from .joint import ORIENTATION_ANGLES, Coupling, Joint
 from .messages import listing, suggest
 from .units import split_quantity
 
@@ -186,6 +186,9 @@ def _of_point(axes: str) -> Table:
         out[name] = Quantity(unit, array=True, width=n)
     for name, unit in (turning, turned):
         out[name] = Quantity(unit, array=True, width=0 if planar else n)
+    if not planar:
+        out |= {k: Quantity("rad") for k in ORIENTATION_ANGLES}
+        out |= {f"{k}_rate": Quantity("rad/s") for k in ORIENTATION_ANGLES}
     return out | {"quaternion": Quantity("1", array=not planar, width=4), "rotation": Quantity("1", width=9)}
 
 
@@ -193,7 +196,7 @@ def _of_locks(model: Model, body: Body) -> Table:
     """Return the lock efforts of a body with coordinates that events lock, one for each."""
     locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
     own = dict.fromkeys(what for owner, _, what in (x.rpartition(".") for x in locked) if owner == body.name)
-    units = {what: _effort("rad" if what == "angle" else "m") for what in own}
+    units = {what: _effort(body.coordinates[what].unit) for what in own}
     return {f"{what}_effort": Quantity(unit, curve=True, array=True) for what, unit in units.items()}
 
 
@@ -220,12 +223,13 @@ def _of_joint(e: Joint, axes: str) -> Table:
     own = e.measured(planar)
     out: Table = {}
     for what, c in own.items():
-        out[what] = Quantity(c.unit, curve=True, array=True)
-        rate, second = (Quantity(c.unit + per, array=True) for per in ("/s", "/s^2"))
+        always = not c.singular  # other coordinates are computed on demand
+        out[what] = Quantity(c.unit, curve=always, array=always)
+        rate, second = (Quantity(c.unit + per, array=always) for per in ("/s", "/s^2"))
         if len(own) == 1:
             out |= {"rate": Quantity(rate.unit, f"{what}_rate", curve=True)}
             out |= {"acceleration": Quantity(second.unit, f"{what}_acceleration")}
-        out |= {f"{what}_rate": rate._replace(curve=len(own) > 1), f"{what}_acceleration": second}
+        out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
     if hasattr(e, "nearest"):
         out["place"] = Quantity("m", curve=True)
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
@@ -351,6 +355,9 @@ def _point_curves(owner: str, whole: str, component: int | None, planar: bool) -
         return "coordinate", f"{owner}.{'xyz'[component]}", int(whole == "velocity")
     if planar and whole in ("angle", "angular_velocity"):
         return "coordinate", f"{owner}.angle", int(whole == "angular_velocity")
+    angle = whole.removesuffix("_rate")
+    if angle in ORIENTATION_ANGLES:
+        return "coordinate", f"{owner}.{angle}", int(angle != whole)
     spin = whole == "angular_velocity" and component is not None
     return ("spin", f"{owner}.{'xyz'[component or 0]}", 1) if spin else None
 

@@ -21,15 +21,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..constraints.inclination import KIND_ELEVATION
 from ..engine.entry_point import characteristic_rate_within
 from ..engine.kinematics import quaternion_at
 from ..engine.loads import force_row
+from ..math.vec import mm, transpose
 from ..model.joint import Joint
 from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 from ..numerics.integrators.radau_stages import RADAU_A as RADAU
 from ..tables.law_inputs import forces_in_events
 from ..tables.structure_definition import velocity_names
 from .energy_balance import EnergyBudget, budgets_by_part, lag_warning
+from .recorded_kinematics import coordinate_records, measured_coordinate
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -140,6 +143,38 @@ MAX_ORIENTATION_ERROR = 0.02  # reported orientation error of a body [rad]
 MAX_TURN, TURN_STEP = 12.0, 0.01  # [rad] per step: range and spacing of the table of errors
 MAX_TURN_RADAU = 2.0 * np.arctan(3.0**0.5)  # the same for `radau`, which takes no larger steps
 NEWTON_ITERATIONS = 20  # iterations of Newton's method
+
+
+JUMP = 1.0  # [rad] by which a coordinate changes more than the bodies turn, from which on it is a jump
+
+
+def singular_passage_warnings(result: Result) -> list[str]:
+    """Warnings on coordinates of rotations in use that jump between two output times, at a singular position.
+
+    Roll and yaw change by half a turn at a pitch of 90 deg, the components of a rotation vector their sign at half a
+    turn. What acts along them, or depends on them, jumps as well, and no event is located there.
+    """
+    users = {(t.owner.name, t.what): t for t in result.values.structure.terms if t.owner is not None}
+    found = []
+    for (name, what), t in sorted(users.items()):
+        if not t.owner.coordinates[what].singular or len(result.t) < 2:
+            continue
+        F, M, c = coordinate_records(result.motions, t.owner, what)
+        R = np.stack([x + result.motions.zeros() for x in mm(transpose(F[1]), M[1])], axis=-1).reshape(-1, 3, 3)
+        traces = np.einsum("nij,nij->n", R[1:], R[:-1]).real
+        turned = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
+        value, _, _ = measured_coordinate(result.motions, t.owner, what)
+        change = np.diff(np.real(value))
+        jumps = np.flatnonzero((np.abs(change) > turned + JUMP) & (t.formula.kind != KIND_ELEVATION))
+        if len(jumps):
+            k = int(jumps[0])
+            by, by_bodies = np.degrees(change[k]), np.degrees(turned[k])
+            found.append(
+                f"{name}.{what}, which {t.element.title} uses, changes by {by:.4g} deg between t = {result.t[k]:.6g} s "
+                f"and {result.t[k + 1]:.6g} s, where the bodies turn by {by_bodies:.4g} deg: it passes its singular "
+                f"position, {c.singular}. Use another coordinate there"
+            )
+    return found
 
 
 def orientation_error_warning(result: Result) -> str:
@@ -334,6 +369,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
         *_undetermined_force_warnings(result),
         *_creep_warnings(result),
         *transverse_slip_warnings(result),
+        *singular_passage_warnings(result),
         *pull_warnings(result),
     ]
     return tuple(text for text in texts if text)

@@ -27,7 +27,7 @@ from ..engine.kinematics import (
 )
 from ..engine.rows import COEFFICIENT, row_parameters
 from ..math.vec import add, cross, dot, load3, load9, matrix_product, mm, neg, scale, store3, sub
-from ..model.body import Frame
+from ..model.body import Frame, Located
 from ..model.joint import Coordinate, Joint
 from ..tables.law_inputs import force_reading_count
 from ..tables.values import Values
@@ -183,17 +183,43 @@ def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, flo
     return {name: float(more) for name, more in ahead.items() if more != 0.0}
 
 
-def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
-    """(frame, extra rotation or ()) twice: the frames between which a joint's coordinate is measured, from F and M."""
-    c = joint.coordinates[what]
-    ends = []
-    for role in c.frames:
-        turn = getattr(c, f"turn_{role}")
-        ends.append((x.structure.frame_at[joint.name, role, ""], turn))
-    return ends[0], ends[1], c
+def coordinate_records(
+    records: RecordedMotion, owner: Joint | Located, what: str
+) -> tuple[KinematicRecord, KinematicRecord, Coordinate]:
+    """Return the records of the frames between which a coordinate of a joint, body or frame is measured."""
+    c = owner.coordinates[what]
+    first, second = (_turned_record(_end(records, owner, role), getattr(c, f"turn_{role}")) for role in c.frames)
+    return first, second, c
 
 
-def turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
+def _end(records: RecordedMotion, owner: Joint | Located, role: str) -> KinematicRecord:
+    if isinstance(owner, Joint):
+        return records.frame(records.x.structure.frame_at[owner.name, role, ""])
+    return records.named(owner.name) if role == "M" else records.attached(-1, (0.0,) * 3, tuple(np.eye(3).ravel()))
+
+
+def measured_coordinate(
+    records: RecordedMotion, owner: Joint | Located, what: str, turns: Any = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a coordinate without its offset, its rate, and its acceleration if the records have true ones.
+
+    ``turns`` approximates an angle that counts whole turns; if it is None, the angle is continuous as far as the output
+    times resolve it.
+    """
+    F, M, c = coordinate_records(records, owner, what)
+    par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+    counts = c.row.of_kind.turns and turns is not None
+    with np.errstate(all="ignore"):  # at a singular position
+        value, f, tM, tF, second = c.row.of_kind.row(
+            (1.0, *par[1:]) if counts else par, F, M, turns if counts else 0.0, records.x.system.const
+        )
+        rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
+    if c.row.of_kind.turns and not counts:
+        value = value + np.unwrap(np.real(value)) - np.real(value)
+    return c.sign * value, c.sign * rate, c.sign * second
+
+
+def _turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
     """Return the record with its axes turned by a constant rotation, if there is one."""
     if not len(turn):
         return record
@@ -240,8 +266,7 @@ def term_coefficient(result: Result, k: int) -> float:
 
 def unit_effort_wrench(result: Result, joint: Joint, what: str) -> Wrench:
     """Return the wrench on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
-    (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
-    F, M = turned_record(result.motions.frame(i), turn_i), turned_record(result.motions.frame(j), turn_j)
+    F, M, c = coordinate_records(result.motions, joint, what)
     par = (*c.row.par[:6], 0.0, 0.0)
     _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)

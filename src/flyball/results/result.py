@@ -341,7 +341,7 @@ class Result:
         m, planar = self.model, self.planar
         names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
         names += [f"{d.name}.effort" for d in m.drivers]
-        names += [f"{j.name}.{what}" for j in m.joints for what in j.measured(planar)]
+        names += [f"{j.name}.{what}" for j in m.joints for what in j.independent(planar)]
         names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
         return {name: self.channel(name) for name in names[:SHOWN_CURVES]} if len(self.t) else {}
 

@@ -239,7 +239,13 @@ def failure_reason(
         or _force_fault_at_end(a, clock)
         or finite_time_escape(a, clock, _component_name)
     )
-    text = text or _lock_up(a, base, clock) or _contradicting_drivers(a, clock) or _step_too_small(a, clock)
+    text = (
+        text
+        or _singular_coordinate(a, t)
+        or _lock_up(a, base, clock)
+        or _contradicting_drivers(a, clock)
+        or _step_too_small(a, clock)
+    )
     return f"{name!r}: {text}{after}", None
 
 
@@ -502,6 +508,12 @@ def _law_texts(e: Element) -> str:
     given |= {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
     texts = [f"{name} = {abbreviated(x)}" for name, x in given.items() if isinstance(x, str)]
     return f", in {'; '.join(texts)}" if texts else ""
+
+
+def _singular_coordinate(a: Assembly, t: float) -> str:
+    """Return a message on a coordinate that is at a singular position where the motion stopped; empty if none is."""
+    text = undefined_row(a.compiled)
+    return text and f"the integration cannot continue at t = {t:.6g} s: {text}"
 
 
 def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:

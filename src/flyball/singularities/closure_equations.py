@@ -295,9 +295,9 @@ def release_driver(model: Model, driver: str, t: float, parameters: Mapping[str,
 
 
 def _coordinate_names(model: Model) -> list[str]:
-    """All coordinates that a driver can drive: of joints, of bodies, and those with a driver now."""
+    """All coordinates that a driver can drive, those with singular positions only if one drives them."""
     axes = ("x", "y", "angle") if model.planar else ("x", "y", "z")
-    out = [f"{j.name}.{what}" for j in model.joints for what in j.measured(model.planar)]
+    out = [f"{j.name}.{what}" for j in model.joints for what in j.independent(model.planar)]
     out += [f"{b.name}.{axis}" for b in model.bodies for axis in axes]
     return list(dict.fromkeys([*out, *(d.coordinate for d in model.drivers)]))
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..compiler.kernels import CodeTable, code_table
-from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
+from ..constraints.blocks import ConstraintRow, Row
 from ..constraints.registry import SIGNATURES
 from ..constraints.switches.guard_kinds import (
     G_LAW,
@@ -24,7 +24,7 @@ from ..constraints.switches.guard_kinds import (
 from ..constraints.switches.guard_kinds import SIGNATURES as SWITCH_SIGNATURES
 from ..constraints.switches.lock import LOCK
 from ..constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW
-from ..model.body import Body, Driver, Frame, Initial
+from ..model.body import Body, Driver, Frame, Initial, Located
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf
 from ..model.event import Event, Impulse, Lock, Release
@@ -122,8 +122,8 @@ def _add_coordinate_row(s: Structure, e: Driver | Initial, text: str, law: int) 
     return s.rows[-1]
 
 
-def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, Coordinate]:
-    """Frames that a joint's coordinate is measured between."""
+def coordinate_frames(s: Structure, owner: Joint | Located, what: str) -> tuple[int, int, Coordinate]:
+    """Frames that a coordinate of a joint, body or frame is measured between."""
     c = owner.coordinates[what]
     first, second = (frame_index(s, owner, role, what if len(getattr(c, f"turn_{role}")) else "") for role in c.frames)
     return first, second, c
@@ -134,14 +134,9 @@ def coordinate_term(
 ) -> TermSpec:
     """Add a coordinate to a row or to a measured quantity; ``with_turns``: including the whole turns of angles."""
     owner, what = s.model.coordinate(text, e)
-    if isinstance(owner, Joint):
-        F, M, c = coordinate_frames(s, owner, what)
-        formula, sign = c.row, c.sign
-    else:
-        F, M, sign = 0, frame_index(s, owner, "M"), 1.0
-        formula = ANGLE if what == "angle" else point_coordinate(what)
-    term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
-    if formula.of_kind.turns and (with_turns or measured):
+    F, M, c = coordinate_frames(s, owner, what)
+    term = TermSpec(row, F, M, c.row, c.sign, e, owner, what, measured)
+    if c.row.of_kind.turns and (with_turns or measured):
         term.hint = turn_state(s, owner, what, F, M)
     s.terms.append(term)
     return term
@@ -160,13 +155,14 @@ def turn_state(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
 def _count_joint_turns(s: Structure) -> None:
     """Add states that count the turns of joint angles.
 
-    In space every joint angle needs one; in the plane only angles of drivers and `Initial` elements, as the bodies' own
-    angles count turns. Coordinates of the forest count their own turns.
+    In space every joint angle needs one, unless it has singular positions, near which its rate has no bound; in the
+    plane only angles of drivers and `Initial` elements, as the bodies' own angles count turns; they need one in any
+    case. Coordinates of the forest count their own turns.
     """
     told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
     for joint in s.model.joints:
         for what, c in joint.measured(s.model.planar).items():
-            needed = not s.model.planar or f"{joint.name}.{what}" in told
+            needed = not (s.model.planar or c.singular) or f"{joint.name}.{what}" in told
             if c.row.of_kind.turns and needed and coordinate_row(s, joint.name, what) is None:
                 turn_state(s, joint, what, *coordinate_frames(s, joint, what)[:2])
 

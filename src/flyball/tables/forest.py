@@ -102,13 +102,10 @@ def _attachments(model: Model, among: Mapping[str, str]) -> Iterator[tuple[str, 
                 yield name, role, force, force.on_points()
     for text, e in _acting_coordinates(model):
         owner, what = model.coordinate(text, e)
-        if isinstance(owner, Joint):
-            c = owner.coordinates[what]
-            for k, role in enumerate(c.frames):
-                if (name := model.carrier(owner.ends()[role], owner)) in among:
-                    yield name, role, owner, sees_point(c.row, "FM"[k])
-        elif (name := model.carrier(owner.name, e)) in among:
-            yield name, "M", owner, what != "angle"
+        c = owner.coordinates[what]
+        for k, role in enumerate(c.frames):
+            if role in owner.ends() and (name := model.carrier(owner.ends()[role], owner)) in among:
+                yield name, role, owner, sees_point(c.row, "FM"[k])
 
 
 def sees_point(row: Row, role: str) -> bool:

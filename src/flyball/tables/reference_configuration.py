@@ -121,7 +121,7 @@ class Poses:
 
     def row(self, f: FrameSpec) -> np.ndarray:
         """Position (3) from the body's centre of mass and rotation (9), in body axes."""
-        key = (f.element.name, f.role, f.coordinate) if f.element is not None else ()
+        key = (f.element.name if f.element is not None else "", f.role, f.coordinate)
         found = self._given.local.get(key)
         if found is None:
             p, R, name = self.world(f)
@@ -140,7 +140,8 @@ class Poses:
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         """Position, rotation and carrier of a frame in the reference configuration."""
         if f.element is None:
-            return np.zeros(3), np.eye(3), GROUND
+            turn = Body.coordinates[f.coordinate].turn_F if f.coordinate else ()
+            return np.zeros(3), np.array(turn) if len(turn) else np.eye(3), GROUND
         key = f.element.name, f.role, f.coordinate
         found = self._given.world.get(key)
         if found is None:

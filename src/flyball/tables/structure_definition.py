@@ -33,7 +33,7 @@ class FrameSpec:
     body: int
     element: Any
     role: str  # "F", "M", "P0"; "world" for ground itself
-    coordinate: str = ""  # rotated for that coordinate of a joint
+    coordinate: str = ""  # rotated for that coordinate of a joint or body
 
 
 @dataclass
@@ -169,10 +169,16 @@ class Structure:
 
 def frame_index(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
     """Index of a frame of an element, created when first needed."""
-    key = (e.name, role, coordinate)
+    world = role not in e.ends()  # of a body, whose coordinates are measured from the world's frame
+    if world and not coordinate:
+        return 0
+    key = ("", "world", coordinate) if world else (e.name, role, coordinate)
     if key not in s.frame_at:
         s.frame_at[key] = len(s.frames)
-        s.frames.append(FrameSpec(s.place[s.model.carrier(e.ends()[role], e)], e, role, coordinate))
+        frame = FrameSpec(-1, None, "world", coordinate)
+        if not world:
+            frame = FrameSpec(s.place[s.model.carrier(e.ends()[role], e)], e, role, coordinate)
+        s.frames.append(frame)
     return s.frame_at[key]
 
 

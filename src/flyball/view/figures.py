@@ -60,7 +60,7 @@ def energies(result: Result) -> Figure:
 
 def coordinates(result: Result) -> Figure | None:
     """Relative coordinates of the joints; those with small variation in a panel of their own."""
-    every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
+    every = [(e, what, e.coordinates[what].unit) for e in result.model.joints for what in e.independent(result.planar)]
     units = dict.fromkeys(unit for _, _, unit in every)
     chosen = [c for unit in units for c in evenly_chosen([c for c in every if c[2] == unit])]
     known = {e.name: result[e.name].channels() for e, _, _ in chosen}

@@ -297,21 +297,20 @@ def coordinate_frames_of(
 
 def is_rotational(owner: Any, what: str) -> bool:
     """Return whether a coordinate is an angle."""
-    return owner.coordinates[what].unit == "rad" if isinstance(owner, Joint) else what == "angle"
+    return owner.coordinates[what].unit == "rad"
 
 
 def coordinate_axis(owner: Any, what: str, base: AttachedFrame, places: AttachedFrames) -> np.ndarray:
     """Return the direction of a coordinate, or its axis, in the world over time, (n, 3)."""
-    k = "xyz".index(what) if what in ("x", "y", "z") and not is_rotational(owner, what) else 2
-    if not isinstance(owner, Joint):
+    axis = what.removeprefix("rotation_")
+    k = "xyz".index(axis) if axis in ("x", "y", "z") else 2
+    if not isinstance(owner, Joint) and owner.coordinates[what].frames[0] == "F":  # the world
         return np.tile(np.eye(3)[k], (len(places.result.t), 1))
     return (places.track(base)[1] @ np.array(_coordinate_rotation(owner, what)))[:, :, k]
 
 
 def _coordinate_rotation(owner: Any, what: str) -> Any:
     """Return the axes of a coordinate relative to those of its frame."""
-    if not isinstance(owner, Joint):
-        return np.eye(3)
     c = owner.coordinates[what]
     turn = getattr(c, f"turn_{c.frames[0]}")
     return turn if len(turn) else np.eye(3)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
+from ...model.joint import ORIENTATION_ANGLES
 from ...model.quantities import Quantity, quantities, unknown_quantity
 
 if TYPE_CHECKING:
@@ -139,6 +140,8 @@ class SplicedView(NamedQuantities):
     @staticmethod
     def _end_to_end(name: str, every: Sequence[np.ndarray]) -> np.ndarray:
         values = np.concatenate(every)
+        if name in ORIENTATION_ANGLES:
+            return np.unwrap(values)
         return continuous_quaternions(values) if name == "quaternion" else values
 
     def channels(self) -> Curves:

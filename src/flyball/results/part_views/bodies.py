@@ -11,8 +11,9 @@ from ...math.scalar import atan2
 from ...math.vec import quaternion_matrix
 from ...model.body import Body, Frame
 from ...model.geometry import matrix_to_quaternion
+from ...model.joint import ORIENTATION_ANGLES
 from ...model.quantities import Quantity, quantities
-from ..recorded_kinematics import KinematicRecord
+from ..recorded_kinematics import KinematicRecord, measured_coordinate
 from .base import NamedQuantities, PartView, components_array, continuous_quaternions
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 class FrameView(PartView):
     """Motion of a frame: a body's reference frame or a named one."""
 
-    instead: ClassVar = {"angle": "a body in space has no single angle: use rotation or quaternion"}
+    instead: ClassVar = {"angle": "a body in space has no single angle: use roll, pitch, yaw, rotation or quaternion"}
 
     def __init__(self, result: Result, element: Body | Frame) -> None:
         super().__init__(result, element)
@@ -54,13 +55,21 @@ class FrameView(PartView):
         return components_array(self._record[5], self._result.planar)
 
     def _found(self, name: str) -> np.ndarray:
-        """Return the effort of a locked coordinate, or the sum of contact forces on a body [N], world axes."""
+        """Return the effort of a locked coordinate, an angle of orientation, or a body's contact force."""
         if name.endswith("_effort"):
             return self._effort(f"{self.element.name}.{name.removesuffix('_effort')}")
+        if (angle := name.removesuffix("_rate")) in ORIENTATION_ANGLES:
+            return self._orientation_angle(angle)[int(angle != name)]
         found, n = self._result.contacts, 2 if self._result.planar else 3
         if found is None or self.element.name not in found.sides.names:
             return np.zeros((len(self._result.t), n))
         return found.force_on(*found.sides.span(self.element.name))[:, 0, :n]
+
+    def _orientation_angle(self, what: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return roll, pitch or yaw [rad] and its rate [rad/s]; whole turns as laws count them, if any names it."""
+        at = self._x.structure.state_at.get(f"{self.element.name}.{what}")
+        turns = None if at is None else self._result.states[:, at]
+        return measured_coordinate(self._result.motions, self.element, what, turns)[:2]
 
     def _effort(self, coordinate: str) -> np.ndarray:
         """Return the force [N] or torque [N m] along a coordinate while it is locked, else 0."""

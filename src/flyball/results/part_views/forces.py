@@ -17,7 +17,7 @@ from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
 from ..event_driven_contacts import ContactHistory
 from ..phases import RecordedModes, stored_reference
-from ..recorded_kinematics import coordinate_frames, turned_record
+from ..recorded_kinematics import coordinate_records
 from .base import Curves, PartView
 
 
@@ -147,8 +147,8 @@ class ForceView(PartView):
         """
         n = len(self._result.t)
         if isinstance(self.element, JointForce):
-            (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
-            axis = turned_record(self._result.motions.frame(k), turn)[1]
+            joint = self._x.structure.model[self.element.joint]
+            axis = coordinate_records(self._result.motions, joint, "angle")[0][1]
             effort = self._whole_along()[2]
             return np.zeros((n, 3)), np.stack([a * effort for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):

@@ -8,11 +8,11 @@ import numpy as np
 
 from ...errors import ModelError
 from ...math.scalar import atan2, rounded
-from ...math.vec import dot, mtv, sub
+from ...math.vec import mtv
 from ...model.body import GROUND
 from ...model.messages import listing, suggest
 from ...tables.forest import coordinate_row
-from ..recorded_kinematics import FULL_TURN, Wrench, coordinate_frames, turned_record
+from ..recorded_kinematics import FULL_TURN, Wrench, measured_coordinate
 from .base import PartView, components_array
 
 if TYPE_CHECKING:
@@ -30,20 +30,14 @@ class JointView(PartView):
 
     def _measure(self, what: str, solved: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return a coordinate, its rate and, if ``solved``, its acceleration, by the row that measures it."""
-        r, x = self._result.records if solved else self._result.motions, self._x
-        (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
-        F, M = turned_record(r.frame(i), turn_i), turned_record(r.frame(j), turn_j)
-        par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
-        hint: Any = 0.0
-        if c.row.of_kind.turns:
-            par, hint = (1.0, *par[1:]), self._turns(what, i, j)
-        value, f, tM, tF, second = c.row.of_kind.row(par, F, M, hint, x.system.const)
-        rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
-        offset = self.element.offset(x.numbers[self.element.name], what)
-        return c.sign * value + offset, c.sign * rate, c.sign * second
+        e = self.element
+        records = self._result.records if solved else self._result.motions
+        turns = self._turns(what) if e.coordinates[what].row.of_kind.turns else None
+        value, rate, second = measured_coordinate(records, e, what, turns)
+        return value + e.offset(self._x.numbers[e.name], what), rate, second
 
-    def _turns(self, what: str, i: int, j: int) -> Any:
-        """Return an approximation of the measured angle that includes full turns."""
+    def _turns(self, what: str) -> Any:
+        """Return an approximation of the measured angle that includes full turns; None if nothing counts them."""
         s, S = self._x.structure, self._x.system
         row = coordinate_row(s, self.element.name, what)
         if row is not None:
@@ -51,7 +45,10 @@ class JointView(PartView):
         name = f"{self.element.name}.{what}"
         if name in s.state_at:
             return self._result.states[:, s.state_at[name]]
+        if not self._result.planar:
+            return None
         r = self._result.motions
+        i, j = (s.frame_at[self.element.name, role, ""] for role in self.element.coordinates[what].frames)
         (here, drawn_here), (there, drawn_there) = (
             (
                 self._heading(k) + r.angle(int(S.frame_body[k])),

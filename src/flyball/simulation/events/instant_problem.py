@@ -151,7 +151,8 @@ class InstantProblem:
     def _acceleration_rounding(self) -> np.ndarray:
         """Return how the rounding of positions changes the accelerations of switches' quantities, (ns,).
 
-        This is rounding of forces, as of stiff springs near their free lengths. All decided switches are off.
+        This is rounding of forces, as of stiff springs near their free lengths: gradients are those of the positions as
+        they are, since that of a deflection turns by any angle near zero. All decided switches are off.
         """
         c, nq, nv = self.here.c, len(self.here.q), self.here.structure.nv
         which, modes = np.flatnonzero(self.m >= 0), self.W.modes.mode.copy()
@@ -159,15 +160,16 @@ class InstantProblem:
         self.put()
         self.state.y.current[nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
         self.engine(MOTION)
-        q_dot, out, before = self.state.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
+        q_dot, out, before = self.state.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(nv)
+        G = self.gradients(which)
         for step in (0.0, POSITION_ROUNDING, -POSITION_ROUNDING):
             self.put()
             self.state.y.current[:nq] += step * q_dot
             if self.engine(MOTION) != 0:
                 break
-            a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed.bias[self.m[which]]
-            before = a if step == 0.0 else before
-            out[which] = np.fmax(out[which], np.abs(a - before))
+            solved = self.W.velocities.solved[:nv].copy()
+            before = solved if step == 0.0 else before
+            out[which] = np.fmax(out[which], np.abs(G @ (solved - before)))
         self.W.modes.mode[:] = modes
         self.run_engine(MOTION)
         return out
