@@ -113,7 +113,9 @@ def _angle_to_singular(t: Any, F: tuple, M: tuple) -> float:
         return float(np.pi - np.arccos(np.clip(0.5 * (np.sum(f * m) - 1.0), -1.0, 1.0)))
     if t.formula.kind == angle.KIND:
         return float(np.linalg.norm(f[:, :2].T @ m[:, 0]))
-    return float(np.linalg.norm(np.cross(f[:, 2], m[:, 0]))) if t.formula.kind == KIND_ELEVATION else np.inf
+    if t.formula.kind == KIND_ELEVATION:
+        return float(np.linalg.norm(np.cross(f[:, 2], m[:, 0])))
+    return float(np.linalg.norm(np.cross(f[:, 2], m[:, 2]))) if isinstance(t.element, Driver) else np.inf
 
 
 def _gap_text(metres: float, radians: float, length: float) -> str:

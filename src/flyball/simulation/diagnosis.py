@@ -221,7 +221,9 @@ def failure_reason(
     t = float(clock.real.t)
     after = f". The motion up to t = {t:.6g} s is kept in the error's result" if with_result else ""
     if clock.count.status == ex.TOO_MANY_STEPS:
-        return f"{name!r}: {_too_many_steps(a, clock)}{rounding_suffix(clock)}{after}", None
+        near = undefined_row(a.compiled)
+        text = f"{_too_many_steps(a, clock)}{rounding_suffix(clock)}{near and f'. There {near}'}"
+        return f"{name!r}: {text}{after}", None
     stack = a.compiled.work.stack
     found = function_fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
@@ -448,7 +450,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
             )
             x, y = law_inputs(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
-                return f"the measured quantity of {e.title} is not finite. {e.fails}"
+                return undefined_row(c) or f"the measured quantity of {e.title} is not finite. {e.fails}"
             laws = [
                 float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
                 for at in S.forces.laws[k].tolist()
