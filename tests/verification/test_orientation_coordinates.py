@@ -113,6 +113,12 @@ def test_whole_turns_of_drivers_and_initial_values():
     assert r["ball.yaw"] == pytest.approx(21 + r.t, abs=1e-12)
     assert np.degrees([r["ball.pitch"][0], r["ball.roll"][0]]) == pytest.approx([50, -170], abs=1e-9)
     assert r["ball.pitch_rate"][0] == pytest.approx(0.3, abs=1e-9)
+    free = fb.Mechanism("free", gravity=None)
+    free.add(fb.Body("b", mass=1, inertia=(0.1, 0.1, 0.1)), fb.Driver("drive", "b.roll", "-50 + t"))
+    free.add(fb.Initial("b.yaw", value=30.0))
+    r = free.simulate(0.1, outputs=5, coordinates="absolute")
+    assert r["b.roll"] == pytest.approx(-50 + r.t, abs=1e-12)
+    assert r["b.yaw"][0] == pytest.approx(30.0, abs=1e-9)
 
 
 def test_damped_pendulum_on_a_ball_joint_is_linearised_about_its_angles():
@@ -155,6 +161,11 @@ def test_what_acts_along_a_jump_is_told():
     m.add(fb.CoordinateSpring("spring", "ball.rotation_y", stiffness=1e-6))
     (told,) = m.simulate(2, outputs=101).health.warnings
     assert "ball.rotation_y, which CoordinateSpring 'spring' uses, changes by -35" in told
+
+
+def test_a_steady_rotation_of_a_ball_joint_is_refused():
+    with pytest.raises(fb.ModelError, match="a rotation about one axis needs a Revolute in place of Spherical 'ball'"):
+        ball().equilibrium(turning=["ball.yaw"])
 
 
 def test_friction_along_one_rotation_of_a_ball_is_refused():

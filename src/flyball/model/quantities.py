@@ -82,9 +82,9 @@ def _quantity_table(model: Model, name: str) -> Table:
         return _of_member(axes)
     e = model[name]
     if isinstance(e, Body):
-        return _of_point(axes) | (_of_contact(axes) if touching else {}) | _of_locks(model, e)
+        return _of_frame(axes) | (_of_contact(axes) if touching else {}) | _of_locks(model, e)
     if isinstance(e, Frame):
-        return _of_point(axes)
+        return _of_frame(axes)
     if e.category == "bulk":
         return body_set_quantities(axes)
     if isinstance(e, Joint):
@@ -186,10 +186,15 @@ def _of_point(axes: str) -> Table:
         out[name] = Quantity(unit, array=True, width=n)
     for name, unit in (turning, turned):
         out[name] = Quantity(unit, array=True, width=0 if planar else n)
-    if not planar:
-        out |= {k: Quantity("rad") for k in ORIENTATION_ANGLES}
-        out |= {f"{k}_rate": Quantity("rad/s") for k in ORIENTATION_ANGLES}
     return out | {"quaternion": Quantity("1", array=not planar, width=4), "rotation": Quantity("1", width=9)}
+
+
+def _of_frame(axes: str) -> Table:
+    """Return the quantities of a body or frame, in space with its angles of orientation, computed on demand."""
+    out = _of_point(axes)
+    for k in ORIENTATION_ANGLES if len(axes) == 3 else ():
+        out |= {k: Quantity("rad"), f"{k}_rate": Quantity("rad/s")}
+    return out
 
 
 def _of_locks(model: Model, body: Body) -> Table:

@@ -264,9 +264,9 @@ def term_coefficient(result: Result, k: int) -> float:
     return result.values.system.term_parameters[k, COEFFICIENT]
 
 
-def unit_effort_wrench(result: Result, joint: Joint, what: str) -> Wrench:
-    """Return the wrench on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
-    F, M, c = coordinate_records(result.motions, joint, what)
+def unit_effort_wrench(result: Result, owner: Joint | Located, what: str) -> Wrench:
+    """Return the wrench on ``body_j``, or on the body, about M's origin, of a unit effort along a coordinate."""
+    F, M, c = coordinate_records(result.motions, owner, what)
     par = (*c.row.par[:6], 0.0, 0.0)
     _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)

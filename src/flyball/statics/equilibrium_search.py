@@ -404,6 +404,8 @@ def _velocity_of_coordinate(b: Assembly, name: str) -> int:
         known = [f"{j.name}.{c}" for j in s.model.joints for c in j.measured(s.model.planar)]
         hint = f"{suggest(str(name), known)}; {listing(known)}"
         raise ModelError(f"turning={name!r}: name a joint's coordinate, for instance 'A.angle'{hint}")
+    if element.coordinates[what].singular:
+        raise ModelError(f"turning={name!r}: a rotation about one axis needs a Revolute in place of {element.title}")
     row = coordinate_row(s, owner, what)
     if row is None:
         raise ModelError(

@@ -68,7 +68,7 @@ def add_constraint_rows(s: Structure, holds: Sequence[Initial]) -> None:
         _add_driver(s, driver)
     for hold in holds:
         _add_coordinate_row(s, hold, hold.name, s.law(Expression.parse("0"), ()))
-    _count_joint_turns(s)
+    _count_turns(s)
 
 
 def _add_joint_rows(s: Structure, joint: Joint) -> None:
@@ -152,19 +152,22 @@ def turn_state(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
     return at
 
 
-def _count_joint_turns(s: Structure) -> None:
-    """Add states that count the turns of joint angles.
+def _count_turns(s: Structure) -> None:
+    """Add states that count the turns of angles.
 
     In space every joint angle needs one, unless it has singular positions, near which its rate has no bound; in the
-    plane only angles of drivers and `Initial` elements, as the bodies' own angles count turns; they need one in any
-    case. Coordinates of the forest count their own turns.
+    plane only angles of drivers and `Initial` elements, as the bodies' own angles count turns; these need one in space
+    too. Coordinates of the forest count their own turns.
     """
-    told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
-    for joint in s.model.joints:
-        for what, c in joint.measured(s.model.planar).items():
-            needed = not (s.model.planar or c.singular) or f"{joint.name}.{what}" in told
-            if c.row.of_kind.turns and needed and coordinate_row(s, joint.name, what) is None:
-                turn_state(s, joint, what, *coordinate_frames(s, joint, what)[:2])
+    told: dict[str, Element] = {d.coordinate: d for d in s.model.drivers} | {i.name: i for i in s.model.initial}
+    needed = [s.model.coordinate(text, e) for text, e in told.items()]
+    if s.model.planar:
+        needed = [(owner, what) for owner, what in needed if isinstance(owner, Joint)]
+    else:
+        needed = [(joint, what) for joint in s.model.joints for what in joint.independent(False)] + needed
+    for owner, what in needed:
+        if owner.coordinates[what].row.of_kind.turns and coordinate_row(s, owner.name, what) is None:
+            turn_state(s, owner, what, *coordinate_frames(s, owner, what)[:2])
 
 
 def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:

@@ -16,6 +16,7 @@ from ..model.body import GROUND
 from ..model.force import CoordinateForce
 from ..model.geometry import matrix_to_quaternion
 from ..model.joint import Joint
+from ..results.recorded_kinematics import unit_effort_wrench
 from .recording import RecordedCurve, RecordedJoint, RecordedLine
 
 if TYPE_CHECKING:
@@ -302,9 +303,10 @@ def is_rotational(owner: Any, what: str) -> bool:
 
 def coordinate_axis(owner: Any, what: str, base: AttachedFrame, places: AttachedFrames) -> np.ndarray:
     """Return the direction of a coordinate, or its axis, in the world over time, (n, 3)."""
-    axis = what.removeprefix("rotation_")
-    k = "xyz".index(axis) if axis in ("x", "y", "z") else 2
-    if not isinstance(owner, Joint) and owner.coordinates[what].frames[0] == "F":  # the world
+    if owner.coordinates[what].singular:  # the torque of a unit effort
+        return np.stack(unit_effort_wrench(places.result, owner, what)[1], axis=1)
+    k = "xyz".index(what) if what in ("x", "y", "z") else 2
+    if not isinstance(owner, Joint):
         return np.tile(np.eye(3)[k], (len(places.result.t), 1))
     return (places.track(base)[1] @ np.array(_coordinate_rotation(owner, what)))[:, :, k]
 
