@@ -48,9 +48,10 @@ def turned(m: fb.Mechanism, R: Numbers, shift: Numbers) -> fb.Mechanism:
     bodies = {b.name for b in m.bodies}
     for c in used:
         name, _, what = c.partition(".")
-        if name in bodies and not (m.planar and what == "angle"):
+        if name in bodies:
             raise Unsupported(f"{c} is measured along the world's axes")
-        if m.find(name) is not None and type(m[name]).__name__ in OWN_AXES and what in ("x", "y", "z"):
+        own = ("x", "y", "z") if type(m.find(name)).__name__ in OWN_AXES else ()
+        if what in own or isinstance(m.find(name), fb.Spherical):
             raise Unsupported(f"{c} is measured along axes that are not given")
     angle = float(np.arctan2(R[1, 0], R[0, 0]))
     return again(m, lambda e: _turned(e, R, shift, angle, m.planar), gravity=tuple(R @ np.asarray(m.gravity)))

@@ -16,7 +16,7 @@ BASE = {
     "rad": (0, 0, 0), "1": (0, 0, 0), "": (0, 0, 0),
 }  # fmt: skip
 NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?:\.\w+)?(?!\w*\()")
-ANGLES = ("angle", "angle_1", "angle_2")
+ANGLES = ("angle", "angle_1", "angle_2", *fb.Spherical.coordinates)
 
 
 class Unsupported(Exception):

@@ -247,7 +247,9 @@ def orientations(d: Dice) -> Case:
                 lambda k=k, c=c: fb.Actuator(f"F{k}", c, force=law(d, m, 1.0, ("value", "rate"))),
                 lambda k=k, c=c: fb.Limit(f"F{k}", c, upper=d.number(0.05, 1.0), stiffness=d.pick([None, 100.0])),
                 lambda k=k, c=c: fb.Driver(f"D{k}", c, driven(d)),
-                lambda k=k, c=c: fb.Event(f"E{k}", f"t > {d.number(0.1, 0.4)}", do=[fb.Lock(c)]),
+                lambda k=k, c=c: fb.Event(
+                    f"E{k}", f"t > {d.number(0.1, 0.4)}", do=[fb.Lock(c if c.startswith("J") else "Jb1")]
+                ),
             ]
         )
         case.add(make)
