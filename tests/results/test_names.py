@@ -127,7 +127,7 @@ def test_unknown_attributes_get_candidates():
         r["cart"].omeg  # noqa: B018
     with pytest.raises(AttributeError, match="did you mean 'angle_rate'"):
         r["A"].angle_rat  # noqa: B018
-    with pytest.raises(AttributeError, match="use rotation or quaternion"):
+    with pytest.raises(AttributeError, match="use roll, pitch, yaw, rotation or quaternion"):
         deep()["a"].angle  # noqa: B018
 
 
