@@ -54,7 +54,7 @@ PARAMETERS = {
     knife_edge.KIND: {"": AXES},
     relative_spin.KIND: {"": AXES},
     inclination.KIND_ANGLE: {"angle": AXES},
-    inclination.KIND_ELEVATION: {"elevation": AXES},
+    inclination.KIND_PITCH: {"pitch": AXES},
     rotation_component.KIND: {"": AXES},
 }
 CASES = [(kind, name) for kind, sets in PARAMETERS.items() for name in sets]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints import angle, rotation_component
-from ..constraints.inclination import KIND_ELEVATION
+from ..constraints.inclination import KIND_PITCH
 from ..engine.kinematics import load_record
 from ..engine.rows import row_parameters
 from ..errors import AssemblyError
@@ -113,7 +113,7 @@ def _angle_to_singular(t: Any, F: tuple, M: tuple) -> float:
         return float(np.pi - np.arccos(np.clip(0.5 * (np.sum(f * m) - 1.0), -1.0, 1.0)))
     if t.formula.kind == angle.KIND:
         return float(np.linalg.norm(f[:, :2].T @ m[:, 0]))
-    if t.formula.kind == KIND_ELEVATION:
+    if t.formula.kind == KIND_PITCH:
         return float(np.linalg.norm(np.cross(f[:, 2], m[:, 0])))
     return float(np.linalg.norm(np.cross(f[:, 2], m[:, 2]))) if isinstance(t.element, Driver) else np.inf
 

@@ -146,7 +146,7 @@ CONSTANT_DISTANCE = (Row(distance.KIND, (0.0,) * 7 + (1.0,)),)
 ANGLE = Row(angle.KIND, (0.0,) * 7 + (1.0,), measure="rad")
 """Coordinate: angle of M's x axis about F's z axis."""
 
-PITCH = _row(inclination.KIND_ELEVATION, "z", "x", measure="rad")
+PITCH = _row(inclination.KIND_PITCH, "z", "x", measure="rad")
 """Coordinate: angle of M's x axis below F's x-y plane."""
 
 DEFLECTION = _row(inclination.KIND_ANGLE, "z", "z", measure="rad")

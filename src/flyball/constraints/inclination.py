@@ -1,11 +1,11 @@
-"""The angle between a direction f fixed in F and a direction m fixed in M, and the elevation of m above a plane of F.
+"""The angle between a direction f fixed in F and a direction m fixed in M, and the pitch of m against a plane of F.
 
-``angle_row``: theta = atan2(|m x f|, m.f), from 0 to pi: the deflection of an axis. ``elevation_row``: the angle of m
-below the plane square to f, theta - pi/2, from -pi/2 to pi/2: the pitch, with x of M as m and z of F as f. Both have
-the rate n.(w_M - w_F) with the unit vector n = f x m / |f x m|.
+``angle_row``: theta = atan2(|m x f|, m.f), from 0 to pi: the deflection of an axis. ``pitch_row``: the angle of m
+below the plane square to f, theta - pi/2, from -pi/2 to pi/2; for the coordinate of that name m is x of M and f is z of
+F. Both have the rate n.(w_M - w_F) with the unit vector n = f x m / |f x m|.
 
-Where m and f are parallel n has no direction. There a deflection is at its least or greatest value: n is zero. An
-elevation is the second of three angles of rotation, of which the other two are undefined there: n is no number.
+Where m and f are parallel n has no direction. There a deflection is at its least or greatest value: n is zero. A
+pitch is the second of three angles of rotation, of which the other two are undefined there: n is no number.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..math.scalar import atan2, divide, sqrt, unless_zero
 from ..math.vec import add, cross, dot, mv, neg, scale, sub
 
 KIND_ANGLE = 18
-KIND_ELEVATION = 19
+KIND_PITCH = 19
 
 
 @formula
@@ -54,11 +54,11 @@ def angle_row(par, F, M, hint, data):
 
 
 @formula
-def elevation_row(par, F, M, hint, data):
+def pitch_row(par, F, M, hint, data):
     """Value, force on M, torques on M and F, acceleration bias."""
     f, m, e, s, c = directions(par, F, M)
     r = divide(1.0, s)
     return turning_row(atan2(-c, s) - par[6], scale(r, e), r, F, M, product_rate(F, M, f, m))
 
 
-ROWS = {KIND_ANGLE: angle_row, KIND_ELEVATION: elevation_row}
+ROWS = {KIND_ANGLE: angle_row, KIND_PITCH: pitch_row}

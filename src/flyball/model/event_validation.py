@@ -58,6 +58,9 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
     found = model.find(a.what)
     if isinstance(found, Joint):
         own = tuple(f"{a.what}.{k}" for k in found.locked(model.planar))
+        if isinstance(a, Release):
+            every = (f"{a.what}.{k}" for k in found.measured(model.planar))
+            own += tuple(x for x in every if x not in own and _locked_somewhere(model, e, {x}))
         if own and (isinstance(a, Lock) or _locked_somewhere(model, e, {a.what, *own})):
             return LockTarget(own)
         if not found.rows(model.planar):

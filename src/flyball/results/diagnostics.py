@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..constraints.inclination import KIND_ELEVATION
+from ..constraints.inclination import KIND_PITCH
 from ..engine.entry_point import characteristic_rate_within
 from ..engine.kinematics import quaternion_at
 from ..engine.loads import force_row
@@ -165,7 +165,7 @@ def singular_passage_warnings(result: Result) -> list[str]:
         turned = np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))
         value, _, _ = measured_coordinate(result.motions, t.owner, what)
         change = np.diff(np.real(value))
-        jumps = np.flatnonzero((np.abs(change) > turned + JUMP) & (t.formula.kind != KIND_ELEVATION))
+        jumps = np.flatnonzero((np.abs(change) > turned + JUMP) & (t.formula.kind != KIND_PITCH))
         if len(jumps):
             k = int(jumps[0])
             by, by_bodies = np.degrees(change[k]), np.degrees(turned[k])
