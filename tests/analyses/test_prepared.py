@@ -53,7 +53,7 @@ def test_double_pendulum():
 @pytest.mark.parametrize("wrong", [[1j, 0.0], ["a", "b"], [True, False], [None, 0.0]])
 def test_what_is_no_real_number_is_refused(wrong):
     p = double_pendulum().prepare(coordinates="joint")
-    with pytest.raises(fb.ModelError, match=r"v contains \w+ numbers; coordinates and velocities are real"):
+    with pytest.raises(fb.ModelError, match=r"v contains \w+ numbers; coordinates, velocities and forces are real"):
         p.acceleration(0.0, p.q, np.array(wrong))
 
 

@@ -6,5 +6,5 @@ from tests.pages import assert_examples_run
 
 
 def test_examples() -> None:
-    assert_examples_run("prepared.md", 16)
+    assert_examples_run("prepared.md", 20)
     assert_examples_run("stepper.md", 8)

@@ -268,7 +268,7 @@ def test_bad_input(p):
     for bad, match in (
         ((q[:-1], v, a), "q has the shape"),
         ((q, v, np.full(len(v), np.nan)), "a or tau of 'forest' is not finite"),
-        ((q, v.astype(complex), a), "must be real"),
+        ((q, v.astype(complex), a), "forces are real"),
         ((np.tile(q, (3, 1)), np.tile(v, (2, 1)), a), "2 states"),
         ((q * 0.0, v, a), "quaternion"),
     ):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numbers
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,7 @@ from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
 from .closed_loops import ClosedLoops
+from .conventions import Convention, continuous_joints, convention
 from .inverse_kinematics import InverseKinematics, PoseRequest, inverse_kinematics
 from .recursive_methods import RecursiveMethods
 
@@ -229,6 +230,39 @@ class Prepared(RecursiveMethods):
         request = PoseRequest(frame, position, rotation, first, starts, seed, rows, sizes, x.entries, drawn, length)
         return inverse_kinematics(self, request)
 
+    def convention(
+        self, program: str, *, joints: Sequence[str] | None = None, circles: Sequence[str] | None = None
+    ) -> Convention:
+        """Convert states to and from the convention of Pinocchio, MuJoCo or Drake.
+
+        Free bodies have other coordinates and velocities there, joints may have another order, and values at the drawn
+        configuration other than zero.
+
+        Parameters
+        ----------
+        program : {"pinocchio", "mujoco", "drake"}
+        joints : list of str, optional
+            Names of joints in the order of their velocities, as ``list(model.names)[2:]`` of a free robot in Pinocchio;
+            a free body that is not named among them comes first. Not needed where the joints form one chain.
+        circles : list of str, optional
+            Joints whose angle they store as cosine and sine. By default, for Pinocchio, revolute joints without stops:
+            those of type continuous in URDF.
+
+        Returns
+        -------
+        Convention
+            Its ``from_flyball(q, v, a)`` and ``to_flyball(q, v, a)`` convert one state or many.
+
+        Raises
+        ------
+        ModelError
+            If a joint is not named, or the program has no counterpart of a point mass or a ball joint.
+        """
+        x = self._recursive
+        if circles is None and program == "pinocchio":
+            circles = continuous_joints(x, {e.coordinate for e in self.model.limits if isinstance(e, Limit)})
+        return convention(x, program, joints, circles)
+
     def __getstate__(self) -> dict[str, Any]:
         return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}
 
@@ -327,21 +361,11 @@ class Prepared(RecursiveMethods):
         )
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return copies as floats; refuse numbers that are not real and finite, and wrong shapes."""
-        out = []
-        for name, x, known in (("q", q, self.q), ("v", v, self.v)):
-            found = np.array(x)
-            if found.dtype.kind not in "iuf":
-                raise ModelError(f"{name} contains {found.dtype.name} numbers; coordinates and velocities are real")
-            if found.shape != known.shape:
-                raise ModelError(
-                    f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
-                    f"coordinates, as p.{name} has"
-                )
-            if not np.isfinite(found).all():
-                raise ModelError(f"{name} of {self.model.name!r} is not finite: {found}")
-            out.append(found.astype(float))
-        return out[0], out[1]
+        """Return copies of one state as floats, checked."""
+        states, k = self._states((q, v))
+        if k is not None:
+            raise ModelError(f"this method takes one state, q ({len(self.q)},) and v ({len(self.v)},), not {k} of them")
+        return states[0][0].copy(), states[1][0].copy()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,6 +34,7 @@ from ..errors import AnalysisError, ModelError
 from ..model.body import GROUND, Frame
 from ..tables.table_definitions import FREE, SPHERICAL, System
 from .closed_loops import ClosedLoops
+from .state_arrays import quaternion_places, refuse_zero_quaternions, state_rows
 
 if TYPE_CHECKING:
     from ..assembly.assembled_state import Assembly
@@ -148,10 +149,7 @@ class BatchDynamics:
         self.system = S._replace(tree=S.tree._replace(law=np.full_like(S.tree.law, -1)))
         self.tables = struct_tables(self.structure, self.system)
         self.paths = velocity_paths(S.tree)
-        self.quaternions = [
-            (int(S.tree.q[b]) + (3 if S.tree.joint[b] == FREE else 0), int(S.tree.v[b]))
-            for b in np.flatnonzero((S.tree.joint == FREE) | (S.tree.joint == SPHERICAL)).tolist()
-        ]
+        self.quaternions = quaternion_places(S.tree)
         self._thread = threading.local()
         self._lock = threading.Lock()
 
@@ -666,33 +664,10 @@ class RecursiveMethods:
 
     def _states(self, given: Sequence[Any]) -> tuple[list[Array], int | None]:
         """Arguments as arrays of rows, and their number: None for one state."""
-        arrays, k = [], None
-        for name, value, n in zip(("q", "v", "a or tau", "a"), given, (len(self.q), *[len(self.v)] * 3), strict=False):
-            found = np.asarray(value)
-            if found.dtype.kind not in "iuf":
-                raise ModelError(f"{name} contains {found.dtype.name} numbers; they must be real")
-            if found.ndim not in (1, 2) or found.shape[-1] != n:
-                raise ModelError(
-                    f"{name} has the shape {found.shape}; {self.model.name!r} has {n} numbers there in these "
-                    f"coordinates: ({n},) for one state, (k, {n}) for k states"
-                )
-            if not math.isfinite(found.sum()) and not np.isfinite(found).all():
-                raise ModelError(f"{name} of {self.model.name!r} is not finite")
-            if found.ndim == 2:
-                if k not in (None, len(found)):
-                    raise ModelError(f"{name} has {len(found)} states, and the arguments before it {k}")
-                k = len(found)
-            arrays.append(found)
-        rows = 1 if k is None else k
-        states = [
-            np.ascontiguousarray(np.broadcast_to(x, (rows, x.shape[-1])) if x.ndim == 1 else x, np.float64)
-            for x in arrays
-        ]
-        for at, d in self._recursive.quaternions:
-            if not np.all(np.any(states[0][:, at : at + 4] != 0.0, axis=1)):
-                raise ModelError(
-                    f"q[{at}:{at + 4}], the quaternion beside {self.names[d]!r}, is zero; it must be a rotation"
-                )
+        lengths = (len(self.q), *[len(self.v)] * 3)
+        named = zip(("q", "v", "a or tau", "a"), given, lengths, strict=False)
+        states, k = state_rows(list(named), self.model.name)
+        refuse_zero_quaternions(states[0], self._recursive.quaternions, self.names)
         return states, k
 
 
