@@ -84,6 +84,62 @@ def test_backwards(case):
     np.testing.assert_allclose(reduced[:, 0, 0] * w**2, 2 * energy, rtol=1e-9)
 
 
+def equations_with_loops(p, q, v, tau):
+    """Accelerations of M a = tau - bias + G^T lam, G a = gamma at any state, by a dense solve."""
+    rows, M = p._loops().rows_at(q[None], v[None]), p.mass_matrix(q)
+    G, n, nr = rows.jacobian[0], len(v), len(p.rows)
+    K = np.block([[M, -G.T], [G, np.zeros((nr, nr))]])
+    return (np.linalg.pinv(K, rcond=1e-10) @ np.r_[tau - p.bias_forces(q, v), rows.gamma[0]])[:n]
+
+
+def test_derivatives(case):
+    """Of the equations, also off the constraints; and along a motion."""
+    p, q, v = case
+    tau = np.linspace(-1, 1, len(p.v))
+    by_q, by_v, by_tau = p.aba_derivatives(q, v, tau)
+    h = 1e-5
+    for i in (2, 5):
+        for k, e in enumerate(h * np.eye(len(p.v))):
+            moved = [equations_with_loops(p, p.step(q[i], s * e), v[i], tau) for s in (1, -1)]
+            turned = [equations_with_loops(p, q[i], v[i] + s * e, tau) for s in (1, -1)]
+            size = max(abs(by_q[i]).max(), abs(by_v[i]).max())
+            np.testing.assert_allclose((moved[0] - moved[1]) / (2 * h), by_q[i, :, k], atol=1e-8 * size)
+            np.testing.assert_allclose((turned[0] - turned[1]) / (2 * h), by_v[i, :, k], atol=1e-8 * size)
+    np.testing.assert_allclose(p.aba(q, v, 2 * tau) - p.aba(q, v, tau), by_tau @ tau, rtol=1e-7, atol=1e-7)
+    run = p.simulate(0.5002, outputs=[0.4998, 0.5, 0.5002], rtol=1e-12)
+    a = p.aba(run.q, run.v, 0 * tau)
+    by_q, by_v, _ = p.aba_derivatives(run.q[1], run.v[1], 0 * tau)
+    np.testing.assert_allclose((a[2] - a[0]) / 4e-4, by_q @ run.v[1] + by_v @ a[1], atol=1e-4 * abs(a).max())
+
+
+def test_derivatives_see_no_springs_and_inverse_mass_is_reduced(case):
+    p, q, v = case
+    m = p.model.changed({})
+    m.add(fb.CoordinateSpring("spring", "A.angle", stiffness=50, damping=5))
+    if m.planar:
+        m.add(fb.JointFriction("friction", "C", radius=0.1, static=0.3))
+    damped = m.prepare(coordinates="joint")
+    tau = np.ones(len(p.v))
+    for x, y in zip(damped.aba_derivatives(q, v, tau), p.aba_derivatives(q, v, tau), strict=True):
+        np.testing.assert_allclose(x, y, atol=1e-12 * abs(y).max())
+    B, _ = p.dependent_velocities(q, v, ["A.angle"])
+    inverse = B @ np.linalg.inv(p.reduced_mass_matrix(q, ["A.angle"])) @ np.swapaxes(B, 1, 2)
+    np.testing.assert_allclose(p.aba_derivatives(q, v, tau).by_force, inverse, atol=1e-9 * abs(inverse).max())
+
+
+def test_bound_calls(case):
+    p, q, v = case
+    tau = np.ones_like(v)
+    out = np.zeros_like(v)
+    p.bind("aba", q, v, tau, out)()
+    np.testing.assert_array_equal(out, p.aba(q, v, tau))
+    outs = p.aba_derivatives(q, v, 0 * tau)
+    p.bind("aba_derivatives", q, v, tau, outs)()
+    np.testing.assert_array_equal(outs, p.aba_derivatives(q, v, tau))
+    with pytest.raises(fb.ModelError, match="threads are for"):
+        p.aba_derivatives(q, v, tau, threads=2)
+
+
 @pytest.mark.parametrize("turned", [0.0, 1e-12])
 def test_a_singular_position_is_refused(turned):
     """A flat parallelogram, whose cranks may turn either way: no number there is right."""

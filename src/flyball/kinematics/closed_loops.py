@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..compiler.kernels import StructBuffer
+from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_step_derivative, complex_system
 from ..engine.batch_constraints import ConstraintArrays, constraint_kernel
 from ..engine.calls import OutputBuffer
-from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, pooled_work
+from ..engine.entry_point import allocate_work, engine, idle_clock_pool, idle_tableau, pooled_work
+from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
+from ..tables.table_definitions import Forces
 
 if TYPE_CHECKING:
     from .recursive_methods import BatchDynamics
@@ -37,6 +40,28 @@ class Constraints(NamedTuple):
 
     jacobian: Array  # (k, nr, nv)
     gamma: Array  # (k, nr)
+
+
+class LoopEquations(NamedTuple):
+    """M a = right + G^T lam, G a = gamma at k states."""
+
+    rows: Constraints
+    M: Array  # (k, nv, nv)
+    L: Array  # (k, nv, nv): M = L L^T
+    G: Array  # (k, nr, nv): rows of unit length
+    norms: Array  # (k, nr)
+
+    def solved(self, right: Array, gamma: Array) -> tuple[Array, Array]:
+        """Accelerations (k, nv, m) and multipliers (k, nr, m) for m right-hand sides.
+
+        With X = L^-1 G^T the accelerations are those without loops plus L^-T y, where y is the shortest vector with
+        X^T y = gamma - G a.
+        """
+        a = np.linalg.solve(self.M, right)
+        X = np.linalg.solve(self.L, np.swapaxes(self.G, 1, 2))
+        y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ (gamma / self.norms[..., None] - self.G @ a)
+        a = a + np.linalg.solve(np.swapaxes(self.L, 1, 2), y)
+        return a, np.linalg.pinv(X, rcond=RANK) @ y / self.norms[..., None]
 
 
 @dataclass(frozen=True)
@@ -86,16 +111,21 @@ class ClosedLoops:
                 f"{self._name!r} has drivers or curves, and recursive dynamics with closed loops supports neither; "
                 "p.acceleration does. Leave drivers out, m.changed({...: None}), and name their coordinates as drives"
             )
-        z = np.tile(c.z, (k, 1))
-        if len(x.system.angles.F):
-            z[:, x.system.angles.state] += (q - self.q) @ self.turns.T
         arrays = ConstraintArrays(
-            np.hstack([q, v, z]), np.zeros((k, nr, len(self.names))), np.zeros((k, nr)), np.zeros((k, nr))
+            self._state_vectors(q, v), np.zeros((k, nr, len(self.names))), np.zeros((k, nr)), np.zeros((k, nr))
         )
         clock, output = idle_clock_pool(arrays.y.shape[1]).new(), StructBuffer(OutputBuffer(np.zeros((1, 1))))
         work = pooled_work(x.structure, x.system, np.float64)
         constraint_kernel(engine.address, x.tables, work, idle_tableau(), clock, output, StructBuffer(arrays))
         return arrays
+
+    def _state_vectors(self, q: Array, v: Array) -> Array:
+        """Coordinates, velocities, and the states of turned angles, (k, nq + nv + nz)."""
+        x = self.dynamics
+        z = np.tile(x.compiled.z, (len(q), 1))
+        if len(x.system.angles.F):
+            z[:, x.system.angles.state] += (q - self.q) @ self.turns.T
+        return np.hstack([q, v, z])
 
     def row_units(self) -> Array:
         """Factors that divide lengths in values of rows by the mechanism's length, (nr,)."""
@@ -133,33 +163,63 @@ class ClosedLoops:
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
         """Accelerations (k, nv) and multipliers (k, nr); with dependent rows the multipliers of least norm.
 
-        With M = L L^T and X = L^-1 G^T the accelerations are those without loops plus L^-T y, where y is the shortest
-        vector with X^T y = gamma - G a.
-
         Raises
         ------
         AnalysisError
             At a singular position, or where the mass matrix is singular.
         """
+        equations = self._equations(q, v)
+        free, gamma = tau - self.bias_forces(q, v), equations.rows.gamma
+        a, lam = equations.solved(free[..., None], gamma[..., None])
+        return a[..., 0], lam[..., 0]
+
+    def forward_dynamics_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array]:
+        """Derivatives of the accelerations by positions, velocities and forces, (k, nv, nv) each.
+
+        M da - G^T dlam = dtau - dr and G da = -ds, where dr and ds are the changes of r = M a + bias - tau - G^T lam
+        and s = G a - gamma at fixed a and lam, by complex steps.
+        """
+        equations = self._equations(q, v)
+        free, gamma = tau - self.bias_forces(q, v), equations.rows.gamma
+        a, lam = equations.solved(free[..., None], gamma[..., None])
+        dr, ds = self._residual_derivatives(q, v, a[..., 0], lam[..., 0])
+        n = len(self.names)
+        unit = np.broadcast_to(np.eye(n), (len(q), n, n))
+        right = np.concatenate([-dr, unit], axis=2), np.concatenate([-ds, np.zeros((*ds.shape[:2], n))], axis=2)
+        changes, _ = equations.solved(*right)
+        by_position, by_velocity, by_force = (np.ascontiguousarray(x) for x in np.split(changes, 3, axis=2))
+        return by_position, by_velocity, by_force
+
+    def _residual_derivatives(self, q: Array, v: Array, a: Array, lam: Array) -> tuple[Array, Array]:
+        """Derivatives of r (k, nv, 2 nv) and s (k, nr, 2 nv) by positions and velocities, without other forces."""
+        x, n, nr = self.dynamics, len(self.names), len(self.rows)
+        S = complex_system(x.system)
+        S = S._replace(forces=Forces(*(column[:0] for column in S.forces)), control_laws=S.control_laws[:0])
+        W = allocate_work(x.structure, S, complex)
+        steps = np.zeros((2 * n, 3 * n + 1), complex)
+        steps[:, : 2 * n] = 1j * COMPLEX_STEP * np.eye(2 * n)
+        out = np.zeros((2 * n, n + 3 * nr + 3 * len(x.structure.measured)), complex)
+        found = np.zeros((len(q), out.shape[1], 2 * n))
+        given = (array.astype(complex) for array in (self._state_vectors(q, v), a, lam))
+        for i, (y, vdot, multipliers) in enumerate(zip(*given, strict=True)):
+            evaluate_residuals(S, W, 0j, y, vdot, multipliers, steps, out)
+            found[i] = complex_step_derivative(out).T
+        return found[:, :n], found[:, n + 2 * nr : n + 3 * nr]
+
+    def _equations(self, q: Array, v: Array) -> LoopEquations:
+        """The equations at states that satisfy the constraints; refuse singular ones."""
         rows = self.constraints(q, v)
         G, norms = self._unit_rows(rows)
         self._refuse_singular(G)
-        M, free = self.mass_matrix(q), tau - self.bias_forces(q, v)
+        M = self.mass_matrix(q)
         try:
-            L = np.linalg.cholesky(M)
+            return LoopEquations(rows, M, np.linalg.cholesky(M), G, norms)
         except np.linalg.LinAlgError:
             values = np.linalg.eigvalsh(M)[:, 0]
             raise AnalysisError(
                 f"{self._name!r}: the mass matrix of the tree is singular at state {int(np.argmin(values))}; give the "
                 f"bodies mass and inertia, or use p.acceleration"
             ) from None
-        a = np.linalg.solve(M, free[..., None])
-        X = np.linalg.solve(L, np.swapaxes(G, 1, 2))
-        residual = (rows.gamma / norms)[..., None] - G @ a
-        y = np.linalg.pinv(np.swapaxes(X, 1, 2), rcond=RANK) @ residual
-        a = a + np.linalg.solve(np.swapaxes(L, 1, 2), y)
-        lam = np.linalg.pinv(X, rcond=RANK) @ y
-        return a[..., 0], lam[..., 0] / norms
 
     def _refuse_singular(self, G: Array) -> None:
         """Refuse singular positions: rows of unit length that are nearly dependent, or more so than at the start."""

@@ -325,7 +325,7 @@ class RecursiveMethods:
         if drives is not None:
             forces = self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), None, threads)[0]
             found = self._for_states(lambda x, y, f, b: self._loops().drive_forces(f, x, y, b, drives), q, v, forces, a)
-            return self._delivered(found, out)
+            return self._delivered([found], out)[0]
         return self._batch(INVERSE_DYNAMICS, (q, v, a), ((len(self.v),),), out, threads)[0]
 
     def bias_forces(self, q: Array, v: Array, *, out: Array | None = None, threads: int = 1) -> Array:
@@ -385,10 +385,8 @@ class RecursiveMethods:
             If a velocity moves no inertia; with closed loops also if a state violates the constraints.
         """
         if self.rows:
-            if threads != 1:
-                raise ModelError("threads are for mechanisms without closed loops; leave them out")
-            found = self._for_states(lambda x, y, f: self._loops().forward_dynamics(x, y, f)[0], q, v, tau)
-            return self._delivered(found, out)
+            found = self._with_loops(lambda x: x.forward_dynamics, (q, v, tau), threads)
+            return self._delivered(found[:1], out)[0]
         return self._batch(FORWARD_DYNAMICS, (q, v, tau), ((len(self.v),),), out, threads)[0]
 
     def loop_multipliers(self, q: Array, v: Array, tau: Array) -> Array:
@@ -399,7 +397,7 @@ class RecursiveMethods:
         ndarray, (nr,) or (k, nr)
             In the order of `Prepared.rows`. With dependent rows those of least norm.
         """
-        return self._for_states(lambda x, y, f: self._loops().forward_dynamics(x, y, f)[1], q, v, tau)
+        return np.asarray(self._with_loops(lambda x: x.forward_dynamics, (q, v, tau), 1)[1])
 
     def dependent_velocities(self, q: Array, v: Array, independent: Sequence[str]) -> tuple[Array, Array]:
         """All velocities and accelerations of a mechanism with closed loops, by independent ones w.
@@ -423,9 +421,7 @@ class RecursiveMethods:
         AnalysisError
             If these velocities are not independent, or do not determine the others.
         """
-        B, c = self._for_states(
-            lambda x, y, _: self._loops().dependent_velocities(x, y, independent), q, v, v, several=True
-        )
+        B, c = self._with_loops(lambda x: lambda q, v: x.dependent_velocities(q, v, independent), (q, v), 1)
         return B, c
 
     def reduced_mass_matrix(self, q: Array, independent: Sequence[str]) -> Array:
@@ -456,9 +452,10 @@ class RecursiveMethods:
     def aba_derivatives(
         self, q: Array, v: Array, tau: Array, *, out: Sequence[Array] | None = None, threads: int = 1
     ) -> ForwardDynamicsDerivatives:
-        """Analytic derivatives of `aba` by position, velocity and generalised forces.
+        """Exact derivatives of `aba` by position, velocity and generalised forces.
 
-        -M^-1 times those of `rnea`, and M^-1.
+        -M^-1 times those of `rnea`, and M^-1. With closed loops, derivatives of the equations with the loops; products
+        with changes dq, dv of the state have a meaning where the changed state satisfies the constraints.
 
         Returns
         -------
@@ -468,9 +465,11 @@ class RecursiveMethods:
         Raises
         ------
         AnalysisError
-            If joints close loops, or a velocity moves no inertia.
+            As for `aba`.
         """
-        self._require_tree("aba_derivatives")
+        if self.rows:
+            found = self._with_loops(lambda x: x.forward_dynamics_derivatives, (q, v, tau), threads)
+            return ForwardDynamicsDerivatives(*self._delivered(found, out))
         n = len(self.v)
         return ForwardDynamicsDerivatives(*self._batch(FORWARD_DERIVATIVES, (q, v, tau), ((n, n),) * 3, out, threads))
 
@@ -561,13 +560,11 @@ class RecursiveMethods:
         -------
         callable
             Without arguments; it raises AnalysisError where accelerations are not determined. One thread at a time may
-            call it.
+            call it. With closed loops, ``aba`` and its derivatives check each state as always.
         """
         if method not in BOUND_METHODS:
             raise ModelError(f"{method!r} cannot be bound; choose one of {', '.join(BOUND_METHODS)}")
         task, results = BOUND_METHODS[method]
-        if method.startswith("aba"):
-            self._require_tree(f"bind({method!r}, ...)")
         if out is None:
             raise ModelError("bind needs arrays for the results, out=")
         n, x = len(self.v), self._recursive
@@ -576,6 +573,8 @@ class RecursiveMethods:
             raise ModelError("q, v and a must be arrays of float64 without gaps, each with as many states")
         shape = (n,) if results == 1 else (n, n)
         arrays = _result_arrays([(*(() if k is None else (k,)), *shape)] * results, out, given)
+        if self.rows and method.startswith("aba"):
+            return lambda: vars(RecursiveMethods)[method](self, q, v, a, out=out)
         flat = _in_rows(arrays, len(given[0]), [shape] * results)
         code = x.code(task)
         evaluate: Callable[[], int]
@@ -591,12 +590,20 @@ class RecursiveMethods:
         return call
 
     @staticmethod
-    def _delivered(found: Array, out: Array | None) -> Array:
-        """A result, in the array that is wanted."""
+    def _delivered(found: Sequence[Array], out: Any) -> Sequence[Array]:
+        """Results, in the arrays that are wanted."""
         if out is None:
             return found
-        _result_arrays([found.shape], out)[0][...] = found
-        return out
+        arrays = _result_arrays([x.shape for x in found], out)
+        for x, y in zip(arrays, found, strict=True):
+            x[...] = y
+        return arrays
+
+    def _with_loops(self, method: Callable[[ClosedLoops], Any], given: Sequence[Array], threads: int) -> Any:
+        """Results of a method of the closed loops, for one state or many."""
+        if threads != 1:
+            raise ModelError("threads are for mechanisms without closed loops; leave them out")
+        return self._for_states(method(self._loops()), *given, several=True)
 
     def _for_states(self, evaluate: Callable[..., Any], *given: Array, several: bool = False) -> Any:
         """Result of a function of rows (k, n), for one state or many."""
@@ -615,14 +622,6 @@ class RecursiveMethods:
         if found is None:
             found = vars(self)["_batch_dynamics"] = BatchDynamics(self._start, self.names, self.specialized)
         return found
-
-    def _require_tree(self, method: str) -> None:
-        if self.rows:
-            closing = ", ".join(dict.fromkeys(row.partition(":")[0] for row in self.rows))
-            raise AnalysisError(
-                f"{method} is for mechanisms whose joints form a tree; in these coordinates {self.model.name!r} has "
-                f"constraint equations of {closing}. p.acceleration and p.multipliers solve them"
-            )
 
     def _batch(
         self,
