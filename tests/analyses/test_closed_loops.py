@@ -140,26 +140,59 @@ def test_bound_calls(case):
         p.aba_derivatives(q, v, tau, threads=2)
 
 
-@pytest.mark.parametrize("turned", [0.0, 1e-12])
-def test_a_singular_position_is_refused(turned):
-    """A flat parallelogram, whose cranks may turn either way: no number there is right."""
+def parallelogram(flat: bool):
+    """Three cranks of one length on a bar, which may turn either way where they are flat."""
     m = fb.Mechanism("parallelogram", planar=True, gravity=(0, -9.81))
-    for k in range(3):  # drawn with its cranks upright
-        m.add(fb.Body(f"crank{k}", mass=1, inertia=0.1, position=(k, 0.5)))
-    m.add(fb.Body("bar", mass=1, inertia=0.1, position=(1, 1)))
+    x, y = (1.0, 0.0) if flat else (0.0, 1.0)
+    for k in range(3):
+        m.add(fb.Body(f"crank{k}", mass=1, inertia=0.1, position=(k + x / 2, y / 2)))
+    m.add(fb.Body("bar", mass=1, inertia=0.1, position=(1 + x, y)))
     for k in range(3):
         m.add(fb.Revolute(f"A{k}", "ground", f"crank{k}", at=(k, 0)))
-        m.add(fb.Revolute(f"B{k}", f"crank{k}", "bar", at=(k, 1)))
-    p = m.prepare(coordinates="joint")
-    q = p.q.copy()
-    for d, name in enumerate(p.names):
-        q[d] += (turned - np.pi / 2) * (1 if name.startswith("A") else -1)
-    assert abs(p.constraint(0.0, q)).max() < 1e-12
+        m.add(fb.Revolute(f"B{k}", f"crank{k}", "bar", at=(k + x, y)))
+    return m
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("turned", [0.0, 1e-12])
+def test_a_singular_position_is_refused(turned, flat):
+    """Where the cranks are flat no number is right, also if that is the start; elsewhere they are."""
+    p = parallelogram(flat).prepare(coordinates="joint")
+
+    def at(angle):
+        q = p.q.copy()
+        for d, name in enumerate(p.names):
+            q[d] += (angle if flat else angle - np.pi / 2) * (1 if name.startswith("A") else -1)
+        assert abs(p.constraint(0.0, q)).max() < 1e-12
+        return q
+
     zero, tau = np.zeros(len(p.v)), np.ones(len(p.v))
-    for method in (p.aba, p.loop_multipliers):
+    for method in (p.aba, p.loop_multipliers, p.aba_derivatives):
         with pytest.raises(fb.AnalysisError, match="singular position"):
-            method(q, zero, tau)
-    assert np.isfinite(p.aba(p.q, zero, tau)).all()
+            method(at(turned), zero, tau)
+    bodies = parallelogram(flat).bodies
+    lever = sum(b.mass for b in bodies[:3]) / 4 + bodies[3].mass + sum(b.inertia for b in bodies[:3])
+    angle = p.names.index("A0.angle")
+    a = p.aba(at(1.0), zero, 0 * tau)
+    np.testing.assert_allclose(a[angle], -9.81 * (1.5 + 1.0) * np.cos(1.0) / lever, rtol=1e-9)
+
+
+def test_an_infinitesimal_mechanism_is_refused():
+    """Two bars in line between fixed points: the middle moves by no finite amount."""
+    m = fb.Mechanism("shaky", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Body("b", mass=1, inertia=0.1, position=(1.5, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
+    m.add(fb.Revolute("C", "b", "ground", at=(2, 0)))
+    p = m.prepare(coordinates="joint")
+    with pytest.raises(fb.AnalysisError, match="singular position"):
+        p.aba(p.q, p.v, np.ones(len(p.v)))
+
+
+def test_numbers_that_overflow():
+    p = four_bar().prepare(coordinates="joint")
+    B, _ = p.dependent_velocities(p.q, np.zeros(len(p.v)), ["A.angle"])
+    with pytest.raises(fb.AnalysisError, match="'four-bar': the results at state 0 are not finite"):
+        p.aba(p.q, 1e200 * B[:, 0], np.zeros(len(p.v)))
 
 
 def test_rest_in_balance_is_no_singular_position():

@@ -284,6 +284,18 @@ def test_bad_input(p):
         p.bind("crba", q, v, a, a)
 
 
+def test_numbers_that_overflow(p):
+    q, v, a = state(p, 0, 3)
+    v[1] *= 1e200
+    for method in (p.rnea, p.aba, p.rnea_derivatives, p.aba_derivatives):
+        for given, i in (((q, v, a), 1), ((q[1], v[1], a[1]), 0)):
+            with np.errstate(all="ignore"), pytest.raises(fb.AnalysisError, match=f"state {i} are not finite"):
+                method(*given)
+    assert np.isfinite(p.rnea(q, 1e-199 * v, a)).all()
+    large = p.rnea(q[0], 1e120 * v[0], a[0])  # whose squares overflow, not themselves
+    assert np.isfinite(large).all() and abs(large).max() > 1e200
+
+
 @pytest.mark.parametrize("specialize", [False, True])
 def test_a_velocity_that_moves_no_inertia_is_named(specialize):
     m = fb.Mechanism("thin rod on a vertical shaft", gravity=(0, 0, -G))

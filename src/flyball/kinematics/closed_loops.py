@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -80,6 +81,8 @@ class ClosedLoops:
         Derivatives of turned angles by the coordinates.
     mass_matrix, bias_forces : callable
         Of the tree, at many states.
+    closed_nearby : callable
+        Gives positions near the start that satisfy the constraints.
     """
 
     dynamics: BatchDynamics
@@ -89,6 +92,7 @@ class ClosedLoops:
     turns: Array
     mass_matrix: Callable[[Array], Array]
     bias_forces: Callable[[Array, Array], Array]
+    closed_nearby: Callable[[], Array]
 
     def constraints(self, q: Array, v: Array) -> Constraints:
         """Constraint rows at states (k, nq), (k, nv).
@@ -221,15 +225,32 @@ class ClosedLoops:
                 f"bodies mass and inertia, or use p.acceleration"
             ) from None
 
+    def _relative_singular_values(self, G: Array) -> Array:
+        values = np.linalg.svd(G * self.dynamics.compiled.sizes, compute_uv=False)
+        return np.asarray(values / np.maximum(values[:, :1], np.finfo(float).tiny))
+
+    @cached_property
+    def regular_rank(self) -> int:
+        """Rank of the constraint rows at positions that are not singular.
+
+        Where the rows are dependent at the start, it is the largest at closed positions nearby; of an infinitesimal
+        mechanism, for which there are none, the number of velocities.
+        """
+        ranks = self._ranks(self.q[None], RANK)
+        if ranks[0] < min(len(self.rows), len(self.names)):
+            ranks = self._ranks(self.closed_nearby(), NEARLY_DEPENDENT)
+        return int(ranks.max(initial=0)) if len(ranks) else len(self.names)
+
+    def _ranks(self, q: Array, tolerance: float) -> Array:
+        rows = self.rows_at(q, np.zeros((len(q), len(self.names))))
+        G, _ = self._unit_rows(Constraints(rows.jacobian, rows.gamma))
+        return np.asarray((self._relative_singular_values(G) > tolerance).sum(axis=1))
+
     def _refuse_singular(self, G: Array) -> None:
-        """Refuse singular positions: rows of unit length that are nearly dependent, or more so than at the start."""
-        start = self.rows_at(self.q[None], np.zeros((1, len(self.names))))
-        at_start, _ = self._unit_rows(Constraints(start.jacobian, start.gamma))
-        values = np.linalg.svd(np.concatenate([G, at_start]) * self.dynamics.compiled.sizes, compute_uv=False)
-        relative = values / np.maximum(values[:, :1], np.finfo(float).tiny)
-        ranks = (relative > RANK).sum(axis=1)
+        """Refuse singular positions: rows of unit length that are nearly dependent, or more so than nearby."""
+        relative = self._relative_singular_values(G)
         nearly = np.any((relative > RANK) & (relative < NEARLY_DEPENDENT), axis=1)
-        singular = np.asarray(nearly)[:-1] | (ranks[:-1] < ranks[-1])
+        singular = nearly | ((relative > RANK).sum(axis=1) < self.regular_rank)
         if singular.any():
             raise AnalysisError(
                 f"state {int(np.argmax(singular))} is a singular position of {self._name!r}, or nearly one: its "

@@ -35,6 +35,12 @@ SINGULAR = 1e-6
 """Smallest singular value of the Jacobian, relative to the largest, below which a position is singular."""
 
 
+REACH = 0.1
+"""Size of random displacements to configurations nearby, in radians or lengths of the mechanism."""
+LEAST_DISPLACEMENT = 0.1
+"""Part of it that remains of a displacement after the constraints are satisfied again."""
+
+
 @dataclass(frozen=True)
 class InverseKinematics:
     """Configurations at which a frame has a given pose, the nearest to the one wanted first.
@@ -139,6 +145,19 @@ def inverse_kinematics(p: Prepared, request: PoseRequest) -> InverseKinematics:
             f"beyond stops; more starts= search farther"
         )
     return _distinct(p, target, q[good], begin)
+
+
+def closed_nearby(p: Prepared, request: PoseRequest) -> Array:
+    """Configurations near one, and apart from it, at which all constraints are satisfied, (m, nq)."""
+    first, begin = request.near, _starts(p, request)
+    steps = REACH * request.sizes * np.random.default_rng(request.seed).normal(size=(request.starts, len(p.v)))
+    free = np.full(len(first), np.inf)
+    begin = begin._replace(q=np.array([p.step(first, d) for d in steps]), lower=-free, upper=free)
+    nothing = np.zeros(0, int)
+    target = _Target(request.frame, np.zeros(3), np.eye(3), nothing, np.zeros(0), request.constraints)
+    q, error = _iterate(p, target, begin)
+    apart = np.linalg.norm((q - first) / begin.units, axis=1) > LEAST_DISPLACEMENT * REACH
+    return np.asarray(q[apart & (np.linalg.norm(error, axis=1) <= ROUNDING)])
 
 
 def _target(p: Prepared, request: PoseRequest) -> _Target:

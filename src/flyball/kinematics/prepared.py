@@ -9,6 +9,7 @@ import numbers
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,11 @@ from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
 from .closed_loops import ClosedLoops
 from .conventions import Convention, continuous_joints, convention
-from .inverse_kinematics import InverseKinematics, PoseRequest, inverse_kinematics
+from .inverse_kinematics import InverseKinematics, PoseRequest, closed_nearby, inverse_kinematics
 from .recursive_methods import RecursiveMethods
+
+NEARBY = 32
+"""Number of positions near the start from which closed ones are searched, to see the usual rank of constraints."""
 
 
 class Prepared(RecursiveMethods):
@@ -168,9 +172,14 @@ class Prepared(RecursiveMethods):
         return q
 
     def _loops(self) -> ClosedLoops:
-        """Return its closed loops, for recursive dynamics."""
-        tree, turns = self._recursive, self._by_coordinates
-        return ClosedLoops(tree, self.names, self.rows, self.q, turns, self.mass_matrix, self.bias_forces)
+        """Return its closed loops, for recursive dynamics; made on first use."""
+        if "_closed_loops" not in vars(self):
+            tree, turns = self._recursive, self._by_coordinates
+            nearby = partial(closed_nearby, self, self._pose_request(self.model.bodies[0].name, self.q, NEARBY))
+            vars(self)["_closed_loops"] = ClosedLoops(
+                tree, self.names, self.rows, self.q, turns, self.mass_matrix, self.bias_forces, nearby
+            )
+        return vars(self)["_closed_loops"]  # type: ignore[no-any-return]
 
     def _scaled_rows(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values and Jacobians of constraint rows at many positions, lengths divided by the mechanism's."""
@@ -222,13 +231,17 @@ class Prepared(RecursiveMethods):
         AnalysisError
             If there are drivers or curves besides closed loops.
         """
-        x = self._recursive
         first = self.q if near is None else self._states((near,))[0][0][0]
+        return inverse_kinematics(self, self._pose_request(frame, first, starts, seed, position, rotation))
+
+    def _pose_request(
+        self, frame: str, near: np.ndarray, starts: int, seed: int = 0, position: Any = None, rotation: Any = None
+    ) -> PoseRequest:
+        x = self._recursive
         length, drawn = float(x.system.scales.length), x.system.bodies.offset[x.paths.body]
-        sizes = x.compiled.sizes
         rows = self._scaled_rows if self.rows else None
-        request = PoseRequest(frame, position, rotation, first, starts, seed, rows, sizes, x.entries, drawn, length)
-        return inverse_kinematics(self, request)
+        sizes = x.compiled.sizes
+        return PoseRequest(frame, position, rotation, near, starts, seed, rows, sizes, x.entries, drawn, length)
 
     def convention(
         self, program: str, *, joints: Sequence[str] | None = None, circles: Sequence[str] | None = None
@@ -264,7 +277,7 @@ class Prepared(RecursiveMethods):
         return convention(x, program, joints, circles)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics")}
+        return {k: x for k, x in vars(self).items() if k not in ("_here", "_batch_dynamics", "_closed_loops")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, _here=threading.local())

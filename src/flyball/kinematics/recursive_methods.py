@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import threading
 from collections.abc import Callable, Sequence
@@ -34,12 +35,13 @@ from ..errors import AnalysisError, ModelError
 from ..model.body import GROUND, Frame
 from ..tables.table_definitions import FREE, SPHERICAL, System
 from .closed_loops import ClosedLoops
-from .state_arrays import quaternion_places, refuse_zero_quaternions, state_rows
+from .state_arrays import quaternion_places, refuse_overflow, refuse_zero_quaternions, state_rows
 
 if TYPE_CHECKING:
     from ..assembly.assembled_state import Assembly
 
 Array = np.ndarray
+FLOAT, copyto = np.dtype(np.float64), np.copyto
 _NO_COLUMNS = np.zeros((1, 0, 0))
 
 
@@ -89,8 +91,6 @@ class OneState:
 
     Attributes
     ----------
-    states : list of ndarray
-        Coordinates, velocities, accelerations or forces, as far as the task needs them.
     results : list of ndarray
     """
 
@@ -102,30 +102,32 @@ class OneState:
         shapes: Sequence[tuple[int, ...]],
         frame: FrameOnBody,
     ) -> None:
-        code = x.code(task)
-        self.states = [np.zeros((1, n)) for n in lengths]
-        self.results = [np.zeros(shape) for shape in shapes]
-        if code is None:
-            flat = [r.reshape(1, -1, r.shape[-1]) for r in self.results]
-            self.call: Callable[[], int] = partial(x.workspace.bound(_batch_arrays(self.states, flat, frame)), task)
-        else:
-            self.call = code.bound(self.states, self.results)
-        self.quaternions, self.largest = x.quaternions, LARGEST_ANGLE if code is not None else math.inf
+        sizes = [math.prod(shape) for shape in shapes]
+        self._given, self._result = np.zeros(sum(lengths)), np.zeros(sum(sizes))
+        self._given_zeros, self._result_zeros = np.zeros(sum(lengths)), np.zeros(sum(sizes))
+        parts = np.split(self._given, np.cumsum(lengths)[:-1])
+        self._parts = [(part, part.shape) for part in parts]
+        pieces = np.split(self._result, np.cumsum(sizes)[:-1])
+        self.results = [piece.reshape(shape) for piece, shape in zip(pieces, shapes, strict=True)]
+        self._call = x.bound(task, [part[None] for part in parts], _in_rows(self.results, 1, shapes), frame)
+        self._quaternions = [k for k, _ in x.quaternions]
+        self._largest_square = None if x.code(task) is None else LARGEST_ANGLE**2
 
     def evaluate(self, given: Sequence[Array]) -> bool:
-        """Evaluate; return False if the arguments need the checked path."""
-        total = 0.0
-        for mine, x in zip(self.states, given, strict=True):
-            mine[0] = x
-            total += np.add.reduce(x)
-        if not math.isfinite(total):
+        """Evaluate; return False if arguments or results need the checked path."""
+        for (part, shape), x in zip(self._parts, given):
+            if type(x) is not Array or x.dtype is not FLOAT or x.shape != shape:
+                return False
+            copyto(part, x)
+        if self._given.dot(self._given_zeros) != 0.0:  # 0 times a number that is not finite is nan
             return False
         q = given[0]
-        if self.largest < math.inf and np.abs(q).max(initial=0.0) > self.largest:
+        if self._largest_square is not None and q.dot(q) > self._largest_square:
             return False
-        if any(not (q[k] or q[k + 1] or q[k + 2] or q[k + 3]) for k, _ in self.quaternions):
-            return False
-        return self.call() == 1
+        for k in self._quaternions:
+            if not (q[k] or q[k + 1] or q[k + 2] or q[k + 3]):
+                return False
+        return self._call() == 1 and self._result.dot(self._result_zeros) == 0.0
 
 
 class BatchDynamics:
@@ -194,6 +196,18 @@ class BatchDynamics:
                 self._code[task] = batch_code(self.structure, self.system, self.paths, task)
             return self._code[task]
 
+    def bound(
+        self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody
+    ) -> Callable[[], int]:
+        """A call on these arrays, with a workspace of its own: it returns the number of states that succeeded."""
+        if (code := self.code(task)) is not None:
+            return code.bound(states, results)
+        kernel = _Workspace(self).bound(_batch_arrays(states, results, frame))
+        addresses = [ctypes.c_void_p(int(x)) for x in kernel.words[1:]]  # converted once: half the time of a call
+        call = partial(kernel.kernel.call, *addresses, ctypes.c_int64(task))
+        call.in_memory = kernel  # type: ignore[attr-defined]  # the arrays, as long as the call exists
+        return call
+
     def evaluate(
         self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody, threads: int
     ) -> None:
@@ -226,6 +240,7 @@ class BatchDynamics:
         for i, end in zip(failed, ends[1:], strict=True):
             if i < end:
                 self.raise_singular(i, states)
+        refuse_overflow(results, self.structure.model.name)
 
     def raise_singular(self, i: int, states: Sequence[Array]) -> None:
         """Raise the error of a state at which the accelerations are not determined."""
@@ -551,8 +566,8 @@ class RecursiveMethods:
         method : {"rnea", "aba", "rnea_derivatives", "aba_derivatives"}
         q, v, a : ndarray
             Float arrays without gaps, read at each call: coordinates, velocities, accelerations (or forces, for
-            ``aba``), of one state or of k. Numbers that are not finite, and with ``specialize`` angles beyond 1e5 rad,
-            give results that are not.
+            ``aba``), of one state or of k. Numbers that are not finite or whose squares overflow, and with
+            ``specialize`` angles beyond 1e5 rad, give results that are not.
         out : ndarray, or tuple of three for derivatives
             Arrays for the results.
 
@@ -576,12 +591,7 @@ class RecursiveMethods:
         if self.rows and method.startswith("aba"):
             return lambda: vars(RecursiveMethods)[method](self, q, v, a, out=out)
         flat = _in_rows(arrays, len(given[0]), [shape] * results)
-        code = x.code(task)
-        evaluate: Callable[[], int]
-        if code is None:  # with a workspace of its own: other calls may run beside it
-            evaluate = partial(_Workspace(x).bound(_batch_arrays(given, flat, _NO_FRAME)), task)
-        else:
-            evaluate = code.bound(given, flat)
+        evaluate = x.bound(task, given, flat, _NO_FRAME)
 
         def call() -> None:
             if evaluate() < len(given[0]):
@@ -590,11 +600,11 @@ class RecursiveMethods:
         return call
 
     @staticmethod
-    def _delivered(found: Sequence[Array], out: Any) -> Sequence[Array]:
-        """Results, in the arrays that are wanted."""
+    def _delivered(found: Sequence[Array], out: Any, given: Sequence[Array] = ()) -> list[Array]:
+        """Results, in the arrays that are wanted, which do not overlap those given."""
         if out is None:
-            return found
-        arrays = _result_arrays([x.shape for x in found], out)
+            return list(found)
+        arrays = _result_arrays([x.shape for x in found], out, given)
         for x, y in zip(arrays, found, strict=True):
             x[...] = y
         return arrays
@@ -609,6 +619,7 @@ class RecursiveMethods:
         """Result of a function of rows (k, n), for one state or many."""
         states, k = self._states(given)
         found = evaluate(*[np.broadcast_to(x, (len(states[0]), x.shape[1])) for x in states])
+        refuse_overflow(found if several else (found,), self.model.name)
         if k is None:
             return tuple(x[0] for x in found) if several else found[0]
         return found
@@ -634,8 +645,11 @@ class RecursiveMethods:
     ) -> list[Array]:
         """Check the arguments, evaluate, and return results of the given shapes for each state."""
         x = self._recursive
-        if out is None and threads == 1 and (found := self._one_state(task, given, shapes, frame)) is not None:
-            return found
+        if threads == 1 and (out is None or len(shapes[0]) == 1):  # matrices are written in place
+            one = x.workspace.single.get((task, frame)) or self._one_state(task, len(given), shapes, frame)
+            if one.evaluate(given):
+                found = [r.copy() for r in one.results]
+                return found if out is None else self._delivered(found, out, given)
         states, k = self._states(given)
         if not isinstance(threads, int) or threads < 1:
             raise ModelError(f"threads is {threads!r}; it must be a number of threads, 1 or more")
@@ -645,21 +659,14 @@ class RecursiveMethods:
         x.evaluate(task, states, flat, x.frame(frame) if frame is not None else _NO_FRAME, threads)
         return results
 
-    def _one_state(
-        self, task: int, given: Sequence[Any], shapes: Sequence[tuple[int, ...]], frame: str | None
-    ) -> list[Array] | None:
-        """Results at one state; None if there are several, or something is not ordinary."""
+    def _one_state(self, task: int, given: int, shapes: Sequence[tuple[int, ...]], frame: str | None) -> OneState:
+        """Arrays of this thread for a task at one state, with a number of arguments."""
         x = self._recursive
-        lengths = (len(self.q), len(self.v), len(self.v))[: len(given)]
-        for a, n in zip(given, lengths, strict=True):
-            if type(a) is not np.ndarray or a.shape != (n,) or a.dtype != np.float64:
-                return None
-        known = x.workspace.single
-        if (task, frame) not in known:
-            at = x.frame(frame) if frame is not None else _NO_FRAME
-            known[task, frame] = OneState(x, task, lengths, shapes, at)
-        one = known[task, frame]
-        return [r.copy() for r in one.results] if one.evaluate(given) else None
+        at = x.frame(frame) if frame is not None else _NO_FRAME
+        found = x.workspace.single[task, frame] = OneState(
+            x, task, (len(self.q), len(self.v), len(self.v))[:given], shapes, at
+        )
+        return found
 
     def _states(self, given: Sequence[Any]) -> tuple[list[Array], int | None]:
         """Arguments as arrays of rows, and their number: None for one state."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import AnalysisError, ModelError
 from ..tables.table_definitions import FREE, SPHERICAL, Tree
 
 Array = np.ndarray
@@ -57,6 +57,23 @@ def state_rows(given: Sequence[tuple[str, Any, int]], owner: str) -> tuple[list[
 def is_finite(x: Array) -> bool:
     """Whether all numbers are finite."""
     return math.isfinite(np.add.reduce(x, axis=None)) or bool(np.isfinite(x).all())  # the sum may overflow
+
+
+def refuse_overflow(results: Sequence[Array], owner: str) -> None:
+    """Refuse results (k, ...) that are not finite numbers.
+
+    Raises
+    ------
+    AnalysisError
+        With the first state that has such results.
+    """
+    for x in results:
+        flat = x.reshape(-1)
+        if not math.isfinite(flat.dot(flat)) and not (finite := np.isfinite(x).reshape(len(x), -1).all(axis=1)).all():
+            raise AnalysisError(
+                f"{owner!r}: the results at state {int(np.argmin(finite))} are not finite: coordinates, velocities, "
+                f"accelerations or forces there are so large that products of them overflow"
+            )
 
 
 def quaternion_places(tree: Tree) -> list[tuple[int, int]]:
