@@ -14,7 +14,6 @@ from .recursive_dynamics import (
     VelocityPaths,
     centroidal_momentum_matrix,
     composite_inertias,
-    copy_mass_matrix,
     forward_dynamics,
     forward_dynamics_derivatives,
     frame_jacobian,
@@ -89,8 +88,7 @@ def perform_at_state(S, W, V, D, batch, i, task):
         if task == CENTROIDAL_MATRIX:
             centroidal_momentum_matrix(S, V, D, batch.first[i])
             return 0
-        mass_matrix(V, D)
-        copy_mass_matrix(V, D, batch.first[i])
+        mass_matrix(V, D, batch.first[i])
         return 0
     v = batch.v[i]
     if task == FORWARD_DYNAMICS or task == FORWARD_DERIVATIVES:
@@ -98,15 +96,14 @@ def perform_at_state(S, W, V, D, batch, i, task):
         status = forward_dynamics(S, W, V, D, v, batch.given[i], acceleration)
         if status != 0 or task == FORWARD_DYNAMICS:
             return status
-        differentiate(S, W, V, D, v, acceleration, batch, i)
+        differentiate(S, W, V, D, v, acceleration, batch, i, D.mass)
         forward_dynamics_derivatives(V, D, batch.first[i], batch.second[i], batch.third[i])
         return 0
     if task == INVERSE_DYNAMICS:
         newton_euler(S, W, V, D, v, batch.given[i], batch.first[i, 0])
         return 0
     if task == INVERSE_DERIVATIVES:
-        differentiate(S, W, V, D, v, batch.given[i], batch, i)
-        copy_mass_matrix(V, D, batch.third[i])
+        differentiate(S, W, V, D, v, batch.given[i], batch, i, batch.third[i])
         return 0
     move_bodies(S, V, D, v)
     if task == MOMENTUM:
@@ -117,10 +114,10 @@ def perform_at_state(S, W, V, D, batch, i, task):
 
 
 @formula
-def differentiate(S, W, V, D, v, acceleration, batch, i):
-    """Derivatives of the inverse dynamics by position and velocity; the mass matrix stays in D."""
+def differentiate(S, W, V, D, v, acceleration, batch, i, mass):
+    """Derivatives of the inverse dynamics by position and velocity, and the mass matrix."""
     newton_euler(S, W, V, D, v, acceleration, D.vector[1])
-    newton_euler_derivatives(S, W, V, D, v, acceleration, batch.first[i], batch.second[i])
+    newton_euler_derivatives(S, W, V, D, v, acceleration, batch.first[i], batch.second[i], mass)
 
 
 @formula

@@ -38,6 +38,7 @@ from .articulated_body import (
     store_symmetric,
 )
 from .kinematics import body_pose, normalise_quaternions, twist_column
+from .loads import euler_moment
 
 
 class VelocityPaths(NamedTuple):
@@ -61,7 +62,7 @@ class TreeDynamics(NamedTuple):
     psi: Float2  # (nv, 6)
     chi: Float2  # (nv, 6)
     phi: Float2  # (nv, 6)
-    mass: Float2  # (nv, nv): the mass matrix at and below its diagonal, or its factor
+    mass: Float2  # (nv, nv): the mass matrix, or its factor
     vector: Float2  # (3, nv): accelerations, forces, efforts of drivers
     coordinates: Float1  # (nq,): with normalised quaternions
 
@@ -210,6 +211,17 @@ def move_bodies(S, V, D, v):
 
 
 @formula
+def inertial_force(S, W, D, b):
+    """Force that the motion of body b needs, by Newton's and Euler's laws about its centre of mass."""
+    R, r = load9(W.BK, b, 3), sub(load3(W.BK, b, 0), load3(D.point, b, 0))
+    (w, u), (alpha, a) = load6(D.velocity, b), load6(D.acceleration, b)
+    a = add(a, add(cross(alpha, r), cross(w, add(u, cross(w, r)))))
+    force = scale(S.bodies.mass[b], a)
+    moment = mv(R, euler_moment(load9(S.bodies.inertia, b, 0), mtv(R, w), mtv(R, alpha)))
+    return add(moment, cross(r, force)), force
+
+
+@formula
 def newton_euler(S, W, V, D, v, vdot, tau):
     """Generalised forces that accelerations vdot need at the poses in W: M vdot + bias - gravity (recursively).
 
@@ -218,10 +230,7 @@ def newton_euler(S, W, V, D, v, vdot, tau):
     n = S.tree.parent.shape[0]
     for b in range(n):
         move_body(S, V, D, b, v, vdot)
-        I = body_inertia(S, W, b, load3(D.point, b, 0))
-        velocity = load6(D.velocity, b)
-        force = inertia_times(I, load6(D.acceleration, b))
-        store6(D.force, b, add6(force, cross_force(velocity, inertia_times(I, velocity))))
+        store6(D.force, b, inertial_force(S, W, D, b))
     for b in range(n - 1, -1, -1):
         force = load6(D.force, b)
         for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
@@ -268,27 +277,19 @@ def composite_inertias(S, W, D):
 
 
 @formula
-def mass_matrix(V, D):
-    """The mass matrix at and below its diagonal, from the composite inertias, where it is not zero by structure."""
+def mass_matrix(V, D, M):
+    """The whole mass matrix, symmetric, from the composite inertias; zero for velocities of different branches."""
     for d in range(V.body.shape[0]):
         momentum = inertia_times(load_inertia(D, V.body[d]), load6(D.column, d))
         e = d
         while e >= 0:
-            D.mass[d, e] = dot6(load6(D.column, e), momentum)
-            e = V.previous[e]
-
-
-@formula
-def copy_mass_matrix(V, D, out):
-    """Write the whole mass matrix, symmetric."""
-    n = V.body.shape[0]
-    clear(out, n, n)
-    for d in range(n):
-        e = d
-        while e >= 0:
-            out[d, e] = D.mass[d, e]
-            out[e, d] = D.mass[d, e]
-            e = V.previous[e]
+            M[d, e] = dot6(load6(D.column, e), momentum)
+            M[e, d] = M[d, e]
+            beyond = V.previous[e]
+            for k in range(beyond + 1, e):
+                M[d, k] = 0.0
+                M[k, d] = 0.0
+            e = beyond
 
 
 @formula
@@ -398,15 +399,15 @@ def displacement_terms(S, V, D, v, vdot):
 
 
 @formula
-def newton_euler_derivatives(S, W, V, D, v, vdot, by_position, by_velocity):
-    """Derivatives of `newton_euler` along the velocities and by them, after it; the mass matrix goes to D.mass.
+def newton_euler_derivatives(S, W, V, D, v, vdot, by_position, by_velocity, by_acceleration):
+    """Derivatives of `newton_euler` along the velocities, by them, and by accelerations (the mass matrix), after it.
 
     ``by_position[e, d]`` is the derivative of force e for a displacement of the bodies along velocity d.
     """
     composite_inertias(S, W, D)
     composite_coriolis(S, W, D)
     displacement_terms(S, V, D, v, vdot)
-    mass_matrix(V, D)
+    mass_matrix(V, D, by_acceleration)
     clear(by_position, V.body.shape[0], V.body.shape[0])
     clear(by_velocity, V.body.shape[0], V.body.shape[0])
     for d in range(V.body.shape[0]):
