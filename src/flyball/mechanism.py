@@ -34,8 +34,13 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
         """Write the description to a TOML file; `flyball.load` reads it back exactly.
 
         A path that ends in ``.urdf`` gets URDF, if joints form a tree: revolute, prismatic, fixed and planar joints
-        with their stops, damping and friction. What that format does not have is listed in a `ModelWarning`.
+        with their stops, damping and friction. One that ends in ``.xml`` or ``.mjcf`` gets a model of MuJoCo, with
+        closed loops too. What a format does not have is listed in a `ModelWarning`, or refused.
         """
+        if str(path).lower().endswith((".xml", ".mjcf")):
+            from .robots.mjcf_writer import save_mjcf
+
+            return save_mjcf(self, Path(path))
         if str(path).lower().endswith(".urdf"):
             from .robots.urdf_writer import save_urdf
 

@@ -1,4 +1,5 @@
-"""Robots described in the formats of other programs: URDF (`urdf`, `urdf_writer`) and MJCF (`mjcf`).
+"""Robots described in the formats of other programs: URDF (`urdf`, `urdf_writer`) and MJCF (`mjcf`,
+`mjcf_writer`).
 
 Imports the model and the elements that a robot is made of; nothing else of flyball imports it but `flyball.load`.
 """

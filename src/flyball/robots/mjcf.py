@@ -100,6 +100,8 @@ class _Reader:
             for j in joints:
                 later += self._losses(j)
         m.add(*later)
+        for k in range(M.nsite):
+            m.add(self._frame(k))
         for k in range(M.neq):
             m.add(*self._equality(k))
         parameters: dict[str, float] = {}
@@ -109,6 +111,15 @@ class _Reader:
             m.add(*actuators)
         self._report()
         return m
+
+    def _frame(self, k: int) -> Frame:
+        """A site as a frame."""
+        name, body = self.name("SITE", k, f"site{k}"), self.bodies[self.M.site_bodyid[k]]
+        p, R = self.D.site_xpos[k], self.D.site_xmat[k].reshape(3, 3)
+        if body != GROUND:
+            p, R = self.M.site_pos[k], quaternion_to_matrix(self.M.site_quat[k])
+        place: dict[str, Any] = {"position": tuple(p.tolist()), "orientation": rows(R)}
+        return Frame(name, body, **place)
 
     def _pose(self, b: int) -> dict[str, Any]:
         return {"position": tuple(self.D.xpos[b].tolist()), "orientation": rows(self.D.xmat[b].reshape(3, 3))}
@@ -246,7 +257,7 @@ class _Reader:
 
     def _report(self) -> None:
         M = self.M
-        counts = {"tendons": M.ntendon, "sensors": M.nsensor, "sites": M.nsite, "contact pairs": M.npair}
+        counts = {"tendons": M.ntendon, "sensors": M.nsensor, "contact pairs": M.npair}
         for what, count in counts.items():
             if count:
                 self.unused.append(f"{count} {what}")
