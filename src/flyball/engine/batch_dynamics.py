@@ -1,4 +1,4 @@
-"""Kernel of recursive dynamics at many states: one task at every row of the arrays that it is given."""
+"""Kernels at many states: tasks of recursive dynamics, and constraint rows by calls of the engine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from ..compiler.formulas import formula
 from ..compiler.kernels import kernel
 from ..compiler.struct_layout import Float1, Float2, Float3, Int1
 from ..math.vec import add, load3, load9, mm, mv
+from ..numerics.integrators.butcher_tableaux import Tableau
+from ..numerics.integrators.time_loop import StepState
 from ..tables.table_definitions import System, Work
+from .calls import POSITION, OutputBuffer, call_engine, set_state
 from .recursive_dynamics import (
     TreeDynamics,
     VelocityPaths,
@@ -138,3 +141,43 @@ def frame_pose(W, frame, out):
         out[i] = p[i]
     for i in range(9):
         out[3 + i] = R[i]
+
+
+class ConstraintArrays(NamedTuple):
+    """States and constraint rows, for each state: G(q) vdot = gamma, and the values g of the rows."""
+
+    y: Float2  # (k, ny): q, v, and the states of turned angles
+    jacobian: Float3  # (k, nr, nv)
+    gamma: Float2  # (k, nr)
+    value: Float2  # (k, nr)
+
+
+@kernel
+def constraint_kernel(
+    address: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    clock: StepState,
+    output: OutputBuffer,
+    arrays: ConstraintArrays,
+) -> int:
+    """Evaluate the rows at every state. Returns the number of states.
+
+    Parameters
+    ----------
+    address : int
+        Address of the engine's kernel.
+    """
+    A = (address, S, W, R, clock, output)
+    for i in range(arrays.y.shape[0]):
+        set_state(clock, 0.0, arrays.y[i])
+        call_engine(A, POSITION)
+        for k in range(S.rows.law.shape[0]):
+            for d in range(arrays.jacobian.shape[2]):
+                arrays.jacobian[i, k, d] = 0.0
+            for e in range(S.row_start[k], S.row_start[k + 1]):
+                arrays.jacobian[i, k, S.column[e]] += W.G[e]
+            arrays.gamma[i, k] = W.rows.gamma[k]
+            arrays.value[i, k] = W.rows.value[k]
+    return int(arrays.y.shape[0])

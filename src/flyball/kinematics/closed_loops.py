@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compiler.kernels import StructBuffer
 from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_step_derivative, complex_system
-from ..engine.batch_constraints import ConstraintArrays, constraint_kernel
+from ..engine.batch_dynamics import ConstraintArrays, constraint_kernel
 from ..engine.calls import OutputBuffer
 from ..engine.entry_point import allocate_work, engine, idle_clock_pool, idle_tableau, pooled_work
 from ..engine.residual import evaluate_residuals
