@@ -18,7 +18,6 @@ import numpy as np
 import pinocchio as pin
 
 import flyball as fb
-from flyball.model.geometry import matrix_to_quaternion
 
 Array = np.ndarray
 STATES = 100
@@ -38,10 +37,8 @@ class Pair:
         self.model = pin.buildModelFromUrdf(path, *root)
         self.model.gravity.linear = np.array(m.gravity, float)
         self.data = self.model.createData()
-        self.base = self.p.names[0].partition(".")[0] if floating else ""
         self.first = 6 if floating else 0  # of the joints' velocities
-        joints = {self.model.names[j]: self.model.joints[j] for j in range(1, self.model.njoints)}
-        self.joints = {d: joints[name.partition(".")[0]] for d, name in enumerate(self.p.names) if d >= self.first}
+        self.convention = self.p.convention("pinocchio", joints=list(self.model.names)[2 if floating else 1 :])
 
     def state(self, rng: np.random.Generator) -> tuple[Array, ...]:
         """Random q, v, a of ours."""
@@ -53,22 +50,9 @@ class Pair:
         return q, *rng.normal(size=(2, n))
 
     def theirs(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array, Array]:
-        """Their q, v, a, and T: their base has velocities in its own axes, and spatial accelerations."""
-        Q, T = pin.neutral(self.model), np.zeros((len(v), len(v)))
-        for d, joint in self.joints.items():
-            x = q[d + len(q) - len(v)]
-            Q[joint.idx_q : joint.idx_q + joint.nq] = [x] if joint.nq == 1 else [np.cos(x), np.sin(x)]
-            T[joint.idx_v, d] = 1.0
-        A = np.zeros(len(v))
-        if self.base:
-            position, R = self.p.pose(self.base, q)
-            w, x, y, z = matrix_to_quaternion(R)
-            Q[:7] = *position, x, y, z, w
-            J = self.p.frame_jacobian(self.base, q)
-            T[:3], T[3:6] = R.T @ J[:3], R.T @ J[3:]
-            rate = self.p.frame_jacobian_rate(self.base, q, v) @ v
-            A[:6] = np.r_[R.T @ rate[:3] - np.cross((T @ v)[3:6], (T @ v)[:3]), R.T @ rate[3:]]
-        return Q, T @ v, T @ a + A, T
+        """Their q, v, a, and T."""
+        Q, V, A = self.convention.from_flyball(q, v, a)
+        return Q, V, A, self.convention.velocity_matrix(q)
 
 
 def agreement(x: Pair, states: int) -> dict[str, float]:
@@ -88,7 +72,7 @@ def agreement(x: Pair, states: int) -> dict[str, float]:
             compare("rnea", p.rnea(q, v, a), T.T @ tau)
             compare("crba", p.crba(q), T.T @ M @ T)
             compare("aba", p.aba(q, v, T.T @ tau), a)
-            if not x.base:  # the base's velocities differ, and so do derivatives along them
+            if not x.first:  # the base's velocities differ, and so do derivatives along them
                 pin.computeRNEADerivatives(x.model, x.data, Q, V, A)
                 for name, mine, theirs in zip(("dtau/dq", "dtau/dv"), p.rnea_derivatives(q, v, a),
                                               (x.data.dtau_dq, x.data.dtau_dv), strict=False):  # fmt: skip
