@@ -17,7 +17,7 @@ from ..compiler.kernels import StructBuffer
 from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_step_derivative, complex_system
 from ..engine.batch_dynamics import ConstraintArrays, constraint_kernel
 from ..engine.calls import OutputBuffer
-from ..engine.entry_point import allocate_work, engine, idle_clock_pool, idle_tableau, pooled_work
+from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, pooled_work
 from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
 from ..tables.table_definitions import Forces
@@ -197,9 +197,8 @@ class ClosedLoops:
     def _residual_derivatives(self, q: Array, v: Array, a: Array, lam: Array) -> tuple[Array, Array]:
         """Derivatives of r (k, nv, 2 nv) and s (k, nr, 2 nv) by positions and velocities, without other forces."""
         x, n, nr = self.dynamics, len(self.names), len(self.rows)
-        S = complex_system(x.system)
-        S = S._replace(forces=Forces(*(column[:0] for column in S.forces)), control_laws=S.control_laws[:0])
-        W = allocate_work(x.structure, S, complex)
+        S = self._complex_tables
+        W = pooled_work(x.structure, S.fields, np.complex128)
         steps = np.zeros((2 * n, 3 * n + 1), complex)
         steps[:, : 2 * n] = 1j * COMPLEX_STEP * np.eye(2 * n)
         out = np.zeros((2 * n, n + 3 * nr + 3 * len(x.structure.measured)), complex)
@@ -209,6 +208,13 @@ class ClosedLoops:
             evaluate_residuals(S, W, 0j, y, vdot, multipliers, steps, out)
             found[i] = complex_step_derivative(out).T
         return found[:, :n], found[:, n + 2 * nr : n + 3 * nr]
+
+    @cached_property
+    def _complex_tables(self) -> StructBuffer:
+        """The tables in complex numbers, without forces and controllers."""
+        S = complex_system(self.dynamics.system)
+        forces = Forces(*(column[:0] for column in S.forces))
+        return StructBuffer(S._replace(forces=forces, control_laws=S.control_laws[:0]))
 
     def _equations(self, q: Array, v: Array) -> LoopEquations:
         """The equations at states that satisfy the constraints; refuse singular ones."""
