@@ -109,7 +109,8 @@ class OneState:
         self._parts = [(part, part.shape) for part in parts]
         pieces = np.split(self._result, np.cumsum(sizes)[:-1])
         self.results = [piece.reshape(shape) for piece, shape in zip(pieces, shapes, strict=True)]
-        self._call = x.bound(task, [part[None] for part in parts], _in_rows(self.results, 1, shapes), frame)
+        flat = _in_rows(self.results, 1, shapes)
+        self._call = x.bound(task, [part[None] for part in parts], flat, frame, x.workspace)
         self._quaternions = [k for k, _ in x.quaternions]
         self._largest_square = None if x.code(task) is None else LARGEST_ANGLE**2
 
@@ -197,12 +198,12 @@ class BatchDynamics:
             return self._code[task]
 
     def bound(
-        self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody
+        self, task: int, states: Sequence[Array], results: Sequence[Array], frame: FrameOnBody, workspace: _Workspace
     ) -> Callable[[], int]:
-        """A call on these arrays, with a workspace of its own: it returns the number of states that succeeded."""
+        """A call on these arrays: it returns the number of states that succeeded."""
         if (code := self.code(task)) is not None:
             return code.bound(states, results)
-        kernel = _Workspace(self).bound(_batch_arrays(states, results, frame))
+        kernel = workspace.bound(_batch_arrays(states, results, frame))
         addresses = [ctypes.c_void_p(int(x)) for x in kernel.words[1:]]  # converted once: half the time of a call
         call = partial(kernel.kernel.call, *addresses, ctypes.c_int64(task))
         call.in_memory = kernel  # type: ignore[attr-defined]  # the arrays, as long as the call exists
@@ -591,7 +592,7 @@ class RecursiveMethods:
         if self.rows and method.startswith("aba"):
             return lambda: vars(RecursiveMethods)[method](self, q, v, a, out=out)
         flat = _in_rows(arrays, len(given[0]), [shape] * results)
-        evaluate = x.bound(task, given, flat, _NO_FRAME)
+        evaluate = x.bound(task, given, flat, _NO_FRAME, _Workspace(x))  # its own: other calls may run beside it
 
         def call() -> None:
             if evaluate() < len(given[0]):
