@@ -20,7 +20,8 @@ Describe a mechanism
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
                   JointFriction, Clutch, Brake, PointForce, PointTorque
-    controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them
+    controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
+                  ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file, a robot in urdf; ``m.save(path)`` writes one
@@ -90,6 +91,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from . import testing as testing
     from .assembly.assembled_state import Assembly as Assembly
+    from .controllers.computed_torque import ComputedTorque as ComputedTorque
+    from .controllers.gravity_compensated_pd import GravityCompensatedPD as GravityCompensatedPD
     from .controllers.integrator import Integrator as Integrator
     from .controllers.lag import Lag as Lag
     from .controllers.pid import PID as PID

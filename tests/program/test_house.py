@@ -72,6 +72,7 @@ LATER = {  # imports inside functions of what stands above: methods that lead fr
     "__init__": {"model"},
     "assembly": {"mobility"},
     "cli": {"compiler", "mechanism", "model", "view"},
+    "controllers": {"expression_graph"},
     "derivatives": {"simulation"},
     "mechanism": {"results", "robots", "view"},
     "mechanism_methods": set(LAYER),

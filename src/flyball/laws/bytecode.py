@@ -6,6 +6,9 @@ new number in the table and nothing is compiled again. `evaluate` gives the valu
 first two derivatives by the chain rule; values and derivatives of elementary functions are defined once, in
 `function_value` and `function_slopes`.
 
+Parts that occur more than once are computed once: they stay on the stack below the rest of the law, which copies them
+(`COPY`); `KEEP` then puts the result in the place of the first of them.
+
 A Python function is machine code called by its address, which is in the bytecode. Its arguments are in the first column
 of the stack, one for each row. It writes its value into the second column of the first of these rows, which is nan
 before the call. A failure inside leaves nan, and the record of the fault is at the end of the stack. `python_functions`
@@ -49,8 +52,8 @@ from ..math.scalar import (
 )
 from ..math.spline import spline
 
-CONSTANT, INPUT, SENSOR, CALL, WHOLE_POWER, TABLE, FUNCTION, WHERE, FREEZE, BLEND = range(10)
-ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(10, 20)
+CONSTANT, INPUT, SENSOR, CALL, WHOLE_POWER, TABLE, FUNCTION, WHERE, FREEZE, BLEND, COPY, KEEP = range(12)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(12, 22)
 NEGATE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN, CUBIC, QUINTIC, NOT = range(18)
 
 # meaning of the FUNCTION operand, and of the code that it points to
@@ -169,6 +172,12 @@ def evaluate(code, const, at, stack, x, sensed):
         elif operation == SENSOR:
             top += 1
             stack[top, 0] = sensed[0, operand]
+        elif operation == COPY:
+            top += 1
+            stack[top, 0] = stack[operand, 0]
+        elif operation == KEEP:
+            stack[top - operand, 0] = stack[top, 0]
+            top -= operand
         elif operation == CALL:
             stack[top, 0] = function_value(operand, stack[top, 0])
         elif operation == WHOLE_POWER:
@@ -221,6 +230,12 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
                 store_row(stack, top, sensed[0, operand], sensed[1, operand], sensed[2, operand])
             else:
                 store_row(stack, top, sensed[0, operand], 1.0 if seed == operand else 0.0, 0.0)
+        elif operation == COPY:
+            top += 1
+            store_row(stack, top, stack[operand, 0], stack[operand, 1], stack[operand, 2])
+        elif operation == KEEP:
+            store_row(stack, top - operand, stack[top, 0], stack[top, 1], stack[top, 2])
+            top -= operand
         elif operation == CALL or operation == WHOLE_POWER or operation == TABLE:
             v = stack[top, 0]
             if operation == TABLE:
@@ -483,7 +498,7 @@ def is_entire(code, at):
         elif operation == DIVIDE:
             if code[i - 2] != CONSTANT:
                 return False
-        elif not (operation <= INPUT or operation == FREEZE or ADD <= operation <= MULTIPLY):
+        elif not (operation <= INPUT or operation == FREEZE or COPY <= operation <= MULTIPLY):
             return False
     return True
 

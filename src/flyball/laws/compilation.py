@@ -24,7 +24,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..errors import ExpressionError
-from ..model.expression_parser import FunctionCall, SyntaxNode, call_node
+from ..model.expression_parser import DEFINED, DEFINITIONS, FunctionCall, SyntaxNode, call_node
 from ..model.expressions import Expression, fold_constants
 from .bytecode import (
     ADD,
@@ -32,10 +32,12 @@ from .bytecode import (
     BLEND,
     CALL,
     CONSTANT,
+    COPY,
     DIVIDE,
     FREEZE,
     FUNCTION,
     INPUT,
+    KEEP,
     LESS,
     LESS_EQUAL,
     MAXIMUM,
@@ -499,7 +501,7 @@ def _power(like: SyntaxNode, u: SyntaxNode, exponent: float, broken: bool) -> Sy
 
 
 def _constant(node: SyntaxNode, varying: Collection[str]) -> bool:
-    return not any(n.kind == SIDE or (n.kind == "name" and n.value in varying) for n in node.walk())
+    return not any(n.kind in (SIDE, DEFINED) or (n.kind == "name" and n.value in varying) for n in node.walk())
 
 
 def _refuse_ambiguous_names(
@@ -550,6 +552,7 @@ class _Writer:
         self.tables = tables
         self.program: list[int] = []
         self.depth = self.deepest = 0
+        self.defined: list[int] = []  # rows of the stack that hold the definitions around the present node
 
     def emit(self, operation: int, operand: int, grown: int) -> None:
         self.program += [operation, operand]
@@ -563,6 +566,10 @@ class _Writer:
             return self.emit(CONSTANT, self.slot(float(node.value)), 1)
         if node.kind == SIDE:
             return self.emit(SENSOR, node.value, 1)
+        if node.kind == DEFINITIONS:
+            return self.write_definitions(node)
+        if node.kind == DEFINED:
+            return self.emit(COPY, self.defined[node.value], 1)
         if node.kind == "name" and node.value in self.varying:
             return self.emit(*self.varying[node.value], 1)
         if node.kind == "name":
@@ -571,6 +578,16 @@ class _Writer:
         if constant and not frozen:
             # Parts without an input or a sensor have no derivatives, even where a function's own slope is infinite.
             self.emit(FREEZE, 0, 0)
+
+    def write_definitions(self, node: SyntaxNode) -> None:
+        around, self.defined = self.defined, []
+        *definitions, body = node.args
+        for definition in definitions:
+            self.write(definition)
+            self.defined.append(self.depth - 1)
+        self.write(body)
+        self.emit(KEEP, len(definitions), -len(definitions))
+        self.defined = around
 
     def write_operation(self, node: SyntaxNode, constant: bool) -> None:
         for arg in node.args:

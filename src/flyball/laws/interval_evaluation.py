@@ -19,12 +19,14 @@ from .bytecode import (
     BLEND,
     CALL,
     CONSTANT,
+    COPY,
     COS,
     COUNT,
     DIVIDE,
     FREEZE,
     FUNCTION,
     INPUT,
+    KEEP,
     LESS,
     LESS_EQUAL,
     LOG,
@@ -96,6 +98,12 @@ def read_steps(code: Sequence[int], at: int) -> list[Step]:
     stack: list[int] = []
     for i in range(at + 2, at + 2 + 2 * int(code[at]), 2):
         operation, operand = int(code[i]), int(code[i + 1])
+        if operation == COPY:
+            stack.append(stack[operand])
+            continue
+        if operation == KEEP:
+            del stack[len(stack) - 1 - operand : len(stack) - 1]
+            continue
         if operation in (CONSTANT, INPUT, SENSOR):
             on = (
                 CONSTANT_IN_TIME

@@ -11,10 +11,14 @@ import keyword
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from ..errors import ModelError
 from .element import Element, Number, Unit, element, positive
+
+if TYPE_CHECKING:
+    from .expression_parser import SyntaxNode
+    from .model import Model
 
 
 @element
@@ -141,6 +145,9 @@ class Controller(Element, ABC):
         """Return the controller without limits of its output; itself if it has none."""
         return self
 
+    def examine(self, model: Model) -> None:
+        """Refuse parts of the mechanism that it needs and that do not exist."""
+
     def smoother(self, state: str) -> str:
         """Return the remedy if the controller itself makes the rate of a state jump; empty if only user laws can."""
         return ""
@@ -148,6 +155,13 @@ class Controller(Element, ABC):
     @abstractmethod
     def given(self) -> dict[str, Any]:
         """Return the user's laws by the names that the formulas use: inputs, gains, limits."""
+
+    def derived(self, name: str, wiring: Any) -> SyntaxNode | None:
+        """Return what a name of its formulas means that is neither an input nor a signal; None: a name of laws.
+
+        ``wiring`` substitutes formulas: ``wiring.template(self, text)``, for the mechanism ``wiring.model``.
+        """
+        return None
 
     def called(self, given: str) -> str:
         """Return the name of an input for messages."""

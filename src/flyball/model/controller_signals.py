@@ -230,6 +230,7 @@ def _loop_message(waiting: dict[str, ConnectedState]) -> str:
 
 def check_controller(model: Model, e: Controller) -> None:
     """Refuse a controller whose laws use unknown names or depend on themselves."""
+    e.examine(model)
     own = controller_names(model, e)
     refuse_equal(e, own)
     for name, law in e.given().items():
@@ -294,7 +295,9 @@ class _SignalGraph:
             name = node.value
             if name in given:
                 return self.law(given[name], f"{e.called(name)} of {e.title}")
-            return self.signal(e, name) if name in own else None
+            if name in own:
+                return self.signal(e, name)
+            return e.derived(name, self)
 
         return self.limited(_at(_replaced(tree, found), 0), e.title)
 

@@ -61,6 +61,13 @@ _ENCLOSED = re.compile(r"(?<=[(,])[^(),<>]*(?=[),])")  # text between parenthese
 _WORDS = re.compile(r"\b(if|else|and|or|not|is|for|lambda)\b")
 
 
+DEFINITIONS, DEFINED = "definitions", "defined"
+"""Kinds of nodes for parts that occur more than once: definitions and, last, the expression that uses them; and a use.
+
+The value of a use is the number of its definition, among the innermost definitions around it.
+"""
+
+
 @dataclass(frozen=True)
 class SyntaxNode:
     """One operation of an expression: operator, operands, and its start and end in the text."""
@@ -84,6 +91,8 @@ def tree_text(node: SyntaxNode) -> str:
         return f"{node.value:.6g}"
     if node.kind == "name":
         return str(node.value)
+    if node.kind in (DEFINITIONS, DEFINED):
+        return "(...)"
     args = [tree_text(arg) for arg in node.args]
     infix = (*_CONDITIONS, *_BINARY.values())
     if node.kind in ("neg", "not"):

@@ -22,6 +22,8 @@ from ..errors import ExpressionError, ModelError, UnitError
 from ..math import scalar
 from .expression_parser import (
     CONSTANTS,
+    DEFINED,
+    DEFINITIONS,
     FUNCTIONS,
     SyntaxNode,
     apply_function,
@@ -303,6 +305,13 @@ def _evaluate(node: SyntaxNode, env: Mapping[str, Any], tables: Mapping[str, Tab
         return node.value
     if node.kind == "name":
         return env[node.value]
+    if node.kind == DEFINED:
+        return env[DEFINED][node.value]
+    if node.kind == DEFINITIONS:
+        inner = {**env, DEFINED: []}
+        for definition in node.args[:-1]:
+            inner[DEFINED].append(_evaluate(definition, inner, tables))
+        return _evaluate(node.args[-1], inner, tables)
     args = [
         _evaluate(arg, env, tables) for arg in (function_arguments(node, env) if node.kind == "function" else node.args)
     ]
@@ -379,7 +388,9 @@ OPERATIONS = {
     "or": _fold(operator.or_),
     "not": lambda a: not a if isinstance(a, bool) else ~a,
 }
-_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function", "called"})
+_UNFOLDED = frozenset(
+    {"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function", "called", DEFINITIONS, DEFINED}
+)
 
 
 class ParameterValues(dict[str, Any]):

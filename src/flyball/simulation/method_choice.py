@@ -17,6 +17,7 @@ from ..errors import ModelError
 from ..mobility.mobility import mobility
 from ..model.contact import not_for_impulse_stepping
 from ..model.contact_point import Touch
+from ..model.controller_signals import controller_states
 from ..model.messages import suggest
 from ..model.model import Model
 from ..numerics.integrators.butcher_tableaux import TABLEAUX
@@ -395,8 +396,9 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
 
 
 def unknown_to_impulse_stepping(model: Model) -> list[str]:
-    """Return what impulse time stepping does not support."""
-    return [e.title for e in (*model.events, *model.controllers, *not_for_impulse_stepping(model))]
+    """Return what impulse time stepping does not support; controllers without states are part of the forces' laws."""
+    with_states = dict.fromkeys(x.controller.title for x in controller_states(model))
+    return [*(e.title for e in model.events), *with_states, *(e.title for e in not_for_impulse_stepping(model))]
 
 
 def _given_options(o: SimulateOptions) -> list[str]:
