@@ -134,7 +134,7 @@ class JointController(Controller):
         if what in DERIVATIVES:
             law = f"{DERIVATIVES[what]}_{k}"
             tree = wiring.template(self, law)
-            return time_derivative(tree, wiring.model.environment(), f"{self.called(law)} of {self.title}", what)
+            return time_derivative(tree, wiring.model, f"{self.called(law)} of {self.title}", what)
         if what != "model":
             return None
         leaves: dict[str, SyntaxNode] = {}

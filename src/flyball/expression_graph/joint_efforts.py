@@ -17,7 +17,7 @@ from ..engine.recursive_dynamics import newton_euler, place_bodies, tree_dynamic
 from ..errors import ModelError
 from ..model.body import GROUND
 from ..model.element import Element
-from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode
+from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode, called_table
 from ..model.expressions import Expression, number
 from ..tables.coordinate_choice import spanning_joints
 from ..tables.forest import joint_bodies
@@ -25,12 +25,13 @@ from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure, velocity_names
 from ..tables.values import values
 from .evaluation import directional_derivatives, nodes_in_order
-from .graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL, Graph, Node, object_vector
+from .graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL, Graph, Node, object_vector, spline_derivatives
 from .tracing import object_tables, parameter_symbols
 
 if TYPE_CHECKING:
     from ..controllers.joint_controller import JointController
     from ..model.model import Model
+    from ..model.table import Table
 
 POSITION, RATE, ACCELERATION = "q", "v", "a"
 """First letters of the symbols of a coordinate: its value, rate and acceleration, "q[0]" of the first coordinate."""
@@ -148,10 +149,7 @@ def _controlled_velocities(s: Structure, e: JointController) -> list[int]:
 def law_tree(x: Any) -> SyntaxNode:
     """Tree of a law that computes an expression (a node or a number); every common subexpression is computed once.
 
-    Raises
-    ------
-    ValueError
-        If the expression calls a function that laws do not have (a derivative of a table, for instance).
+    Functions of which only the name is known are tables.
     """
     if not isinstance(x, Node):
         return SyntaxNode("number", (), float(x))
@@ -176,7 +174,7 @@ def _operation(x: Node, args: tuple[SyntaxNode, ...]) -> SyntaxNode:
     if x.op == SYMBOL:
         return SyntaxNode("name", (), x.data.name)
     if x.op == CALL:
-        raise ValueError(f"laws have no function {x.data.printed_name}")
+        return SyntaxNode("table", args, x.data.printed_name)
     if x.op == "choose":  # the second argument where the first is positive, else the third
         return SyntaxNode("where", (SyntaxNode("<", (SyntaxNode("number", (), 0.0), args[0])), *args[1:]))
     if x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0:
@@ -184,28 +182,48 @@ def _operation(x: Node, args: tuple[SyntaxNode, ...]) -> SyntaxNode:
     return SyntaxNode(_OPERATORS.get(x.op) or _NAMES.get(x.op, x.op), args)
 
 
-def time_derivative(tree: SyntaxNode, parameters: Mapping[str, float], where: str, given: str) -> SyntaxNode:
-    """Derivative by time of a law of time and parameters.
+def time_derivative(tree: SyntaxNode, model: Model, where: str, given: str) -> SyntaxNode:
+    """Derivative by time of a law of time, parameters and tables.
 
     Parameters
     ----------
     tree : SyntaxNode
-    parameters : mapping
-        Values of the parameters, for decisions.
+    model : Model
+        The mechanism with the parameters and tables.
     where, given : str
         What the law is, and the field that may give its derivative, for messages.
 
     Raises
     ------
     ModelError
-        If the law reads something else than time, calls a table or a Python function.
+        If the law reads something else, or calls a Python function or a table with jumps of the slope.
     """
+    parameters = model.environment()
+    smooth = {x.name for x in model.tables if x.interpolation != "linear"}
     for n in tree.walk():
-        if n.kind in ("table", "function", "called") or (n.kind == "name" and n.value not in {"t", *parameters}):
+        unknown = n.kind == "name" and n.value not in {"t", *parameters}
+        if unknown or n.kind in ("function", "called") or (n.kind == "table" and called_table(n)[0] not in smooth):
             what = "a Python function" if n.kind in ("function", "called") else f"{n.value!r}"
             raise ModelError(f"{where} depends on {what}, whose derivative by time is not known; give {given}")
     graph = Graph()
     t = graph.symbol("t")
     known: dict[str, Any] = {k: graph.symbol(k, x) for k, x in parameters.items()}
-    value = Expression("", tree).evaluate({**known, "t": t})
+    law = Expression("", tree)
+    curves: Any = {name: _Curve(model[name]) for name in law.tables}
+    value = law.evaluate({**known, "t": t}, curves)
     return law_tree(directional_derivatives([value], [(t, 1.0)])[0])
+
+
+class _Curve:
+    """A table for expressions."""
+
+    def __init__(self, table: Table) -> None:
+        self._functions = spline_derivatives(table.data(), [], 0, table.name)
+
+    def values(self, x: Node) -> list[Node]:
+        """Return value and derivatives."""
+        return [x.graph.call(f, x) for f in self._functions]
+
+    def value(self, x: Node) -> Node:
+        """Return the value."""
+        return self.values(x)[0]

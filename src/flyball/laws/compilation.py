@@ -627,6 +627,28 @@ class _Writer:
 _SHAPES = {"step": "cubic", "step5": "quintic"}
 
 
+def _trapezoid(s: SyntaxNode, fraction: SyntaxNode) -> SyntaxNode:
+    """Rise from 0 to 1 with a trapezoidal slope: (s^2 - max(s - b, 0)^2 - max(s - 1 + b, 0)^2) / (2 b (1 - b)).
+
+    It has no value where b exceeds 1/2.
+    """
+
+    def number(x: float) -> SyntaxNode:
+        return SyntaxNode("number", (), x, fraction.start, fraction.stop)
+
+    def operation(kind: str, *args: SyntaxNode) -> SyntaxNode:
+        return SyntaxNode(kind, args, None, fraction.start, fraction.stop)
+
+    def square(x: SyntaxNode) -> SyntaxNode:
+        return operation("**", x, number(2))
+
+    rest = operation("-", number(1.0), fraction)
+    late, end = (square(operation("max", operation("-", s, b), number(0.0))) for b in (fraction, rest))
+    b = operation("where", operation("<=", fraction, number(0.5)), fraction, number(0.0))
+    size = operation("*", number(2.0), operation("*", b, rest))
+    return operation("/", operation("-", operation("-", square(s), late), end), size)
+
+
 def _expand(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
     """Rewrite steps and powers with a varying exponent in terms of simpler operations."""
 
@@ -634,11 +656,11 @@ def _expand(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
         return SyntaxNode(kind, args, None, node.start, node.stop)
 
     args = tuple(_expand(arg, varying) for arg in node.args)
-    if node.kind in _SHAPES:
-        x, x0, y0, x1, y1 = args
+    if node.kind in _SHAPES or node.kind == "trapezoid":
+        x, x0, y0, x1, y1 = args[:5]
         s = syntax_node("/", syntax_node("-", x, x0), syntax_node("-", x1, x0))
         s = syntax_node("min", syntax_node("max", s, SyntaxNode("number", value=0.0)), SyntaxNode("number", value=1.0))
-        shape = syntax_node(_SHAPES[node.kind], s)
+        shape = syntax_node(_SHAPES[node.kind], s) if node.kind in _SHAPES else _trapezoid(s, args[5])
         return syntax_node("+", y0, syntax_node("*", syntax_node("-", y1, y0), shape))
     if node.kind == "**" and any(n.kind == "name" and n.value in varying for n in args[1].walk()):
         return syntax_node("exp", syntax_node("*", syntax_node("log", args[0]), args[1]))

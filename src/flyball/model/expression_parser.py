@@ -51,6 +51,7 @@ FUNCTIONS = {
     "where": ("condition", "a", "b"),
     "step": ("x", "x0", "y0", "x1", "y1"),
     "step5": ("x", "x0", "y0", "x1", "y1"),
+    "trapezoid": ("x", "x0", "y0", "x1", "y1", "fraction"),
 }
 
 _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
@@ -83,6 +84,17 @@ class SyntaxNode:
         yield self
         for arg in self.args:
             yield from arg.walk()
+
+
+def called_table(node: SyntaxNode) -> tuple[str, int]:
+    """Name of the table that a node of kind "table" calls, and of which order the derivative: "curve'" is the first."""
+    name = str(node.value).rstrip("'")
+    return name, len(node.value) - len(name)
+
+
+def is_closed(node: SyntaxNode) -> bool:
+    """Whether a part of a tree uses no definitions from outside."""
+    return node.kind == DEFINITIONS or (node.kind != DEFINED and all(is_closed(arg) for arg in node.args))
 
 
 def tree_text(node: SyntaxNode) -> str:

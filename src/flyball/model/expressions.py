@@ -27,6 +27,7 @@ from .expression_parser import (
     FUNCTIONS,
     SyntaxNode,
     apply_function,
+    called_table,
     did_you_mean,
     function_arguments,
     function_tree,
@@ -94,7 +95,7 @@ class Expression:
     @cached_property
     def tables(self) -> frozenset[str]:
         """Names of the tables called."""
-        return frozenset(node.value for node in self.tree.walk() if node.kind == "table")
+        return frozenset(called_table(node)[0] for node in self.tree.walk() if node.kind == "table")
 
     def require(self, known: Collection[str]) -> None:
         """Raise `ExpressionError`, with the place and the nearest known names, if an unknown name is used."""
@@ -226,7 +227,11 @@ def law_expression(
 def fold_constants(node: SyntaxNode, text: str) -> SyntaxNode:
     """Replace constant parts of the tree by their value; `ExpressionError` if one is not finite."""
     args = tuple(fold_constants(arg, text) for arg in node.args)
-    if node.kind in ("step", "step5") and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
+    steps = ("step", "step5", "trapezoid")
+    if node.kind == "trapezoid" and args[5].kind == "number" and not 0.0 < args[5].value <= 0.5:
+        remedy = "the fraction of the way from x0 to x1 on which the slope grows: above 0, at most 0.5"
+        refuse_expression(text, args[5].start, args[5].stop, f"{args[5].value:g} is no fraction here", remedy)
+    if node.kind in steps and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
         value = float(args[1].value)
         wider = f"give x1 another value than x0 = {value:g}; a jump is where(x < {value:g}, y0, y1)"
         refuse_expression(text, node.start, node.stop, "this step has no width", wider)
@@ -316,7 +321,8 @@ def _evaluate(node: SyntaxNode, env: Mapping[str, Any], tables: Mapping[str, Tab
         _evaluate(arg, env, tables) for arg in (function_arguments(node, env) if node.kind == "function" else node.args)
     ]
     if node.kind == "table":
-        return tables[node.value].value(*args)
+        name, order = called_table(node)
+        return tables[name].values(args[0])[order] if order else tables[name].value(*args)
     if node.kind in ("function", "called"):
         return apply_function(node.value.function if node.kind == "called" else node.value, *args)
     return OPERATIONS[node.kind](*args)
@@ -366,6 +372,13 @@ def _step(shape: Any) -> Any:
     return step
 
 
+def _trapezoid(x: Any, x0: Any, y0: Any, x1: Any, y1: Any, fraction: Any) -> Any:
+    s = scalar.minimum(scalar.maximum(scalar.divide(x - x0, x1 - x0), 0.0), 1.0)
+    late, end = (scalar.maximum(s - b, 0.0) for b in (fraction, 1.0 - fraction))
+    b = scalar.choose(fraction - 0.5, 0.0, fraction)
+    return y0 + (y1 - y0) * scalar.divide(s * s - late * late - end * end, 2.0 * b * (1.0 - b))
+
+
 OPERATIONS = {
     **{name: getattr(scalar, name) for name, arguments in FUNCTIONS.items() if hasattr(scalar, name)},
     "abs": scalar.absolute,
@@ -374,6 +387,7 @@ OPERATIONS = {
     "where": _where,
     "step": _step(scalar.cubic_rise),
     "step5": _step(scalar.quintic_rise),
+    "trapezoid": _trapezoid,
     "cubic": scalar.cubic_rise,
     "quintic": scalar.quintic_rise,
     "+": operator.add,

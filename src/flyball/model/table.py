@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
-from ..math.spline import BREAKS, pack_spline, spline, spline_expression
+from ..math.spline import BREAKS, PIECE, pack_spline, spline, spline_expression
 from .element import Element, checked_size, element, python_data
 from .expression_parser import CONSTANTS, FUNCTIONS
 from .units import to_si
@@ -71,6 +71,14 @@ class Table(Element):
             If there are fewer than two points, x does not ascend, or a number is not finite.
         """
         return list(self._list)
+
+    def derivative_data(self, order: int) -> list[float]:
+        """Return the first or second derivative of the curve as such a list."""
+        out = self._array.copy()
+        pieces = out[BREAKS + int(out[1]) :].reshape(-1, PIECE)
+        for _ in range(order):
+            pieces[:] = np.c_[pieces[:, 1:] * np.arange(1.0, PIECE), np.zeros(len(pieces))]
+        return out.tolist()
 
     def values(self, x: Any) -> tuple[Any, Any, Any]:
         """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array.

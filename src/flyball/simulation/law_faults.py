@@ -19,7 +19,7 @@ from ..laws.python_functions import TableFault, clear_faults
 from ..model.contact_point import Touch
 from ..model.element import Element
 from ..model.element_laws import force_and_driver_laws
-from ..model.expression_parser import SyntaxNode, tree_text
+from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode, called_table, is_closed, tree_text
 from ..model.expressions import Expression
 from ..model.force import CoordinateForce, Force
 from ..model.messages import abbreviated, shortened_list
@@ -108,7 +108,8 @@ def _table_arguments(
 
     def value(part: SyntaxNode) -> Any:
         names = {n.value for n in part.walk() if n.kind == "name"}
-        return Expression(law.text, part).evaluate(env, tables) if names <= env.keys() else None
+        known = names <= env.keys() and is_closed(part)
+        return Expression(law.text, part).evaluate(env, tables) if known else None
 
     if node.kind == "where":
         condition = value(node.args[0])
@@ -119,7 +120,7 @@ def _table_arguments(
             yield from _table_arguments(node.args[2], law, env, tables, live & ~condition)
         return
     if node.kind == "table" and (x := value(node.args[0])) is not None:
-        yield tables[node.value], np.broadcast_to(np.real(x), live.shape), live
+        yield tables[called_table(node)[0]], np.broadcast_to(np.real(x), live.shape), live
     for arg in node.args:
         yield from _table_arguments(arg, law, env, tables, live)
 
@@ -177,10 +178,17 @@ def undefined_part(law: Expression, values: Mapping[str, Any], tables: Mapping[s
         except (ModelError, ArithmeticError):
             return np.nan
 
-    node = law.tree
+    node, values = law.tree, dict(values)
     if np.isfinite(value(node)):
         return ""
     while True:
+        if node.kind == DEFINITIONS:
+            values[DEFINED] = found = list[Any]()
+            for definition in node.args:
+                found.append(value(definition))
+                if not np.isfinite(found[-1]):
+                    node = definition
+                    break
         read = node.args if node.kind != "where" else (node.args[0], node.args[1 if value(node.args[0]) else 2])
         part = next((arg for arg in read if not np.isfinite(value(arg))), None)
         if part is None:

@@ -173,7 +173,7 @@ def _is_nonsmooth(model: Model, law: Expression) -> bool:
     return bool(law.tables - smooth)
 
 
-_NONSMOOTH = frozenset({"where", "abs", "sign", "min", "max", "step", "step5"})
+_NONSMOOTH = frozenset({"where", "abs", "sign", "min", "max", "step", "step5", "trapezoid"})
 
 
 class NonsmoothPoints:

@@ -15,6 +15,7 @@ from ..laws.python_functions import TableFault, table_fault
 from ..model.controller import Controller
 from ..model.controller_signals import ConnectedState
 from ..model.element import Element
+from ..model.expression_parser import called_table
 from ..model.expressions import Expression
 from ..model.force import Force
 from ..model.model import Model
@@ -146,6 +147,8 @@ class Structure:
 
     def law(self, law: Expression, inputs: tuple[str, ...], owner: Any = None, derivatives: bool = False) -> int:
         """Compile a law of an element into the code; returns where it begins."""
+        if law.tables:
+            self.add_table_derivatives(law)
         at, depth = compile_law(
             law,
             ("t", *inputs),
@@ -162,9 +165,19 @@ class Structure:
         self.laws[at] = law.where
         return at
 
+    def add_table_derivatives(self, law: Expression) -> None:
+        """Add derivatives of tables that a law calls to the constants."""
+        tables = {x.name: x for x in self.model.tables}
+        for node in law.tree.walk():
+            if node.kind == "table" and node.value not in self.table_at:
+                name, order = called_table(node)
+                self.table_at[node.value] = len(self.const)
+                self.const += tables[name].derivative_data(order)
+
     def missed(self, stack: np.ndarray) -> TableFault | None:
         """Last law without a value due to a table, if one is recorded in the laws' scratch."""
-        return table_fault(stack, self.laws, {self.table_at[x.name]: x for x in self.model.tables})
+        tables = {x.name: x for x in self.model.tables}
+        return table_fault(stack, self.laws, {self.table_at[name]: tables[name.rstrip("'")] for name in self.table_at})
 
 
 def frame_index(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
