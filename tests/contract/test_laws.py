@@ -90,6 +90,8 @@ KINKED = [
     "where(t > 1 and t >= 1.5, t, -t)",
     "step(t, 0.2, 1, 1.8, 3)",
     "step5(t, 0.2, 1, 1.8, b)",
+    "trapezoid(t, 0.2, 1, 1.8, b, 0.3)",
+    "trapezoid(t, 2, a, 0.5, 1, 0.1*a/a)",
     "step(t, 2, a, 0.5, 1)",
 ]
 TIMES = [0.31, 0.83, 1.7, 2.2]
