@@ -137,6 +137,11 @@ def inverse_kinematics(p: Prepared, request: PoseRequest) -> InverseKinematics:
     q, error = _iterate(p, target, begin)
     good = np.linalg.norm(error, axis=1) <= ACCEPTED
     if not good.any():
+        if not len(target.rows):
+            raise NotConverged(
+                f"no configuration of {p.model.name!r} was found that closes its loops, from {starts} starts; they may "
+                f"be open everywhere, or closed only beyond stops; more starts= search farther"
+            )
         best = int(np.argmin(np.linalg.norm(error, axis=1)))
         shift, turn = _errors(p, target, q[best : best + 1])[0]
         raise NotConverged(
@@ -163,8 +168,8 @@ def closed_nearby(p: Prepared, request: PoseRequest) -> Array:
 def _target(p: Prepared, request: PoseRequest) -> _Target:
     position, rotation = request.position, request.rotation
     planar = p.model.planar
-    if position is None and rotation is None:
-        raise ModelError("inverse_kinematics needs a position, a rotation, or both")
+    if position is None and rotation is None and request.constraints is None:
+        raise ModelError("inverse_kinematics needs a position, a rotation, or both: there are no loops to be closed")
     where, R, rows = np.zeros(3), np.eye(3), list[int]()
     if position is not None:
         where = vector(_real(position, "position"), planar, "position")
@@ -178,7 +183,7 @@ def _target(p: Prepared, request: PoseRequest) -> _Target:
     if not (np.isfinite(where).all() and np.isfinite(R).all()):
         raise ModelError("position and rotation must be finite")
     scale = np.array([1.0 / request.length] * 3 + [1.0] * 3)
-    return _Target(request.frame, where, R, np.array(rows), scale[rows], request.constraints)
+    return _Target(request.frame, where, R, np.array(rows, int), scale[rows], request.constraints)
 
 
 def _real(value: Any, what: str) -> Array:
@@ -300,7 +305,7 @@ def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinem
         q[flipped, k : k + 4] *= -1.0
 
     def difference(a: Array, b: Array) -> Array:
-        return a - b - np.where(np.isfinite(begin.turn), begin.turn * np.round((a - b) / begin.turn), 0.0)
+        return a - b - np.where(np.isfinite(begin.turn), begin.turn, 0.0) * np.round((a - b) / begin.turn)
 
     q = first + difference(q, first)
     whole = np.where(np.isfinite(begin.turn), begin.turn, 1.0)

@@ -201,7 +201,8 @@ class Prepared(RecursiveMethods):
 
         By damped least squares from many starts at once: ``near``, and random configurations between the stops. An arm
         of six joints has up to 16 solutions but for whole turns of its joints; with more joints there is a continuum,
-        of which some are found. Closed loops are closed in all of them.
+        of which some are found. Closed loops are closed in all of them. Without position and rotation all
+        configurations that close them are looked for: of a parallel robot whose drives stand still its assembly modes.
 
         Parameters
         ----------

@@ -93,9 +93,20 @@ class Corner(NamedTuple):
 
 
 def read_steps(code: Sequence[int], at: int) -> list[Step]:
-    """Steps of the law that starts at ``at``; comparisons have the deciding difference as a third argument."""
+    """Steps of the law that starts at ``at``; comparisons have the deciding difference as a third argument.
+
+    A step that occurs several times is one: corners of a law are not searched twice.
+    """
     out: list[Step] = []
     stack: list[int] = []
+    known: dict[Step, int] = {}
+
+    def place(step: Step) -> int:
+        if step not in known:
+            known[step] = len(out)
+            out.append(step)
+        return known[step]
+
     for i in range(at + 2, at + 2 + 2 * int(code[at]), 2):
         operation, operand = int(code[i]), int(code[i + 1])
         if operation == COPY:
@@ -112,14 +123,17 @@ def read_steps(code: Sequence[int], at: int) -> list[Step]:
                 if operation == INPUT and operand == 0
                 else STATE_DEPENDENT
             )
-            out.append(Step(operation, operand, (), on))
+            stack.append(place(Step(operation, operand, (), on)))
         else:
             count = int(code[operand + COUNT]) if operation == FUNCTION else _operand_count(operation)
             args = tuple(stack[len(stack) - count :])
             del stack[len(stack) - count :]
-            out += _on(out, operation, operand, args)
-        stack.append(len(out) - 1)
-    return out
+            *difference, on_arguments = _on(out, operation, operand, args)
+            for step in difference:
+                on_arguments = on_arguments._replace(args=(*args, place(step)))
+            stack.append(place(on_arguments))
+    # the last step is the law's value
+    return out if not stack or stack[-1] == len(out) - 1 else [*out, out[stack[-1]]]
 
 
 def _operand_count(operation: int) -> int:
