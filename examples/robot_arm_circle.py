@@ -45,7 +45,9 @@ def mechanism(known: float | str = "load") -> fb.Mechanism:
     m = fb.load(ROBOT)
     m.parameters["load"] = 3.0
     q = waypoints(m)
-    m.add(fb.Body("load", mass="load", inertia=("load*0.0004",) * 3, position=(0, 0, 1.22), shape=fb.Sphere(radius=0.05)))
+    m.add(
+        fb.Body("load", mass="load", inertia=("load*0.0004",) * 3, position=(0, 0, 1.22), shape=fb.Sphere(radius=0.05))
+    )
     m.add(fb.Fixed("grip", "tool", "load", at=(0, 0, 1.22)))
     for k, joint in enumerate(JOINTS):
         m.add(fb.Table(f"path_{k + 1}", x=TIMES, y=q[:, k], beyond="hold"))

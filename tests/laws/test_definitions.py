@@ -8,9 +8,9 @@ import pytest
 from flyball.expression_graph.graph import Graph
 from flyball.expression_graph.joint_efforts import law_tree
 from flyball.laws.breakpoints import find_corners
-from flyball.laws.bytecode import BY_MOTION, COPY, evaluate, evaluate_jet, evaluate_over_time
+from flyball.laws.bytecode import BY_MOTION, COPY, evaluate, evaluate_jet
 from flyball.laws.compilation import compile_law
-from flyball.laws.interval_evaluation import read_steps
+from flyball.laws.interval_evaluation import evaluate_over_time, read_steps
 from flyball.model.expression_parser import DEFINITIONS
 from flyball.model.expressions import Expression
 

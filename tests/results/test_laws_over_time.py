@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.laws.bytecode import takes_arrays
+from flyball.laws.interval_evaluation import takes_arrays
 
 T = np.linspace(0.0, 1.0, 41)
 LAWS = {
@@ -52,12 +52,13 @@ def test_on_the_sides_of_a_corner_and_while_sliding_on_it():
     np.testing.assert_allclose(r["s"].displacement_rate[late], v[late], atol=1e-6)
 
 
-def test_number_by_number():
-    """A table's value, and what a function of Python makes of numbers."""
+def test_tables_at_once_and_functions_number_by_number():
     m = sliding("k")
     m.add(fb.Table("push", x=[0.0, 0.5, 1.0], y=[0.0, 1.0, 4.0], interpolation="linear"))
     m.add(fb.Actuator("c", "s.displacement", force="2*push(t)"))
+    m.add(fb.Actuator("f", "s.displacement", force=lambda t, value: 2 * t + value))
     r = m.simulate(1.0, outputs=T)
     S = r.values.system
-    assert [takes_arrays(S.code, int(at)) for at in S.forces.laws[:, 0]] == [True, False]
+    assert [takes_arrays(S.code, int(at)) for at in S.forces.laws[:, 0]] == [True, True, False]
+    np.testing.assert_allclose(r["f"].force, 2 * T + r["s"].displacement, atol=1e-12)
     np.testing.assert_allclose(r["c"].force, 2 * np.interp(T, [0, 0.5, 1], [0, 1, 4]), atol=1e-12)

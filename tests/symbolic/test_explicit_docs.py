@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from flyball.model.contact import has_contact
-from tests.examples.test_examples import EVENTS
+from tests.examples.test_examples import EVENTS, ROBOTS
 from tests.mechanisms import EXAMPLES, example
 from tests.pages import assert_examples_run
 from tests.symbolic.explicit_made import engine, whole
 
-NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
+NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py") and p.name not in ROBOTS)
 
 
 @pytest.mark.parametrize(("page", "least"), [("explicit.md", 16), ("symbolic.md", 16)])

@@ -1,14 +1,14 @@
-"""Evaluation of a law's program over intervals of time: ranges of values and slopes."""
+"""Evaluation of a law's program at many times at once, and over intervals of time: ranges of values and slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..math.scalar import integer_power
+from ..math.scalar import choose, integer_power
 from ..math.spline import BREAKS, PIECE, spline
 from .bytecode import (
     ABS,
@@ -46,6 +46,7 @@ from .bytecode import (
     TAN,
     WHERE,
     WHOLE_POWER,
+    blend_branches,
     combine_values,
     function_slopes,
     function_value,
@@ -92,7 +93,7 @@ class Corner(NamedTuple):
     touched: bool = False
 
 
-def read_steps(code: Sequence[int], at: int) -> list[Step]:
+def read_steps(code: Sequence[int] | np.ndarray, at: int) -> list[Step]:
     """Steps of the law that starts at ``at``; comparisons have the deciding difference as a third argument.
 
     A step that occurs several times is one: corners of a law are not searched twice.
@@ -151,6 +152,85 @@ def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...])
             difference = Step(SUBTRACT, 0, (a, b), on)
             return [difference, Step(operation, operand, (*args, len(before)), on, logical)]
     return [Step(operation, operand, args, on, logical)]
+
+
+def takes_arrays(code: np.ndarray, at: int) -> bool:
+    """Whether the law that starts at ``at`` can be evaluated on arrays: it calls no Python function."""
+    return not (_operations(code, at) == FUNCTION).any()
+
+
+def evaluate_over_time(
+    code: np.ndarray, const: np.ndarray, at: int, x: tuple[np.ndarray, ...], sensed: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Values of a law at many times, (n,).
+
+    Parameters
+    ----------
+    code, const : ndarray
+        Of the tables; constants may be arrays over time, (n,).
+    at : int
+        Where it starts.
+    x : tuple of ndarray (n,)
+        Time and the other inputs of the law.
+    sensed : pair of ndarray (slots, n)
+        Values of sensors; and the sides of corners: where the law has corners, times on the same sides are
+        evaluated together.
+    """
+    steps, out = read_steps(code, at), np.empty(x[0].shape)
+    values, sides = sensed
+    corners = (_operations(code, at) == BLEND).any()
+    for some in _equal_branches(sides, len(out)) if corners else (slice(None),):
+        row = [*values[:, some], *(sides[:, some][:, 0] if corners else sides)]
+        with np.errstate(all="ignore"):
+            out[some] = _values_of_steps(steps, _part(const, some), [a[some] for a in x], row)
+    return out
+
+
+def _values_of_steps(steps: list[Step], const: np.ndarray, x: Sequence[Any], sensed: Sequence[Any]) -> Any:
+    """Value of the last step, for inputs and sensors that are arrays."""
+    v: list[Any] = []
+    for operation, operand, args, *_ in steps:
+        a = [v[k] for k in args]
+        if operation == CONSTANT:
+            v.append(const[operand])
+        elif operation == INPUT:
+            v.append(x[operand])
+        elif operation == SENSOR:
+            v.append(sensed[operand])
+        elif operation == CALL:
+            v.append(function_value(operand, a[0]))
+        elif operation == WHOLE_POWER:
+            v.append(integer_power(a[0], operand))
+        elif operation == TABLE:
+            v.append(spline(const, operand, a[0])[0])
+        elif operation == WHERE:
+            v.append(choose(a[0] - 0.5, a[1], a[2]))
+        elif operation == BLEND:
+            v.append(blend_branches(*a))
+        else:
+            v.append(a[0] if operation == FREEZE else combine_values(operation, a[0], a[1]))
+    return v[-1]
+
+
+def _operations(code: np.ndarray, at: int) -> np.ndarray:
+    return code[at + 2 : at + 2 + 2 * code[at] : 2]
+
+
+def _equal_branches(side_values: np.ndarray, n: int) -> Iterator[np.ndarray]:
+    """Groups of times at which all sides are the same."""
+    _, which = np.unique(side_values, axis=1, return_inverse=True) if len(side_values) else (None, np.zeros(n, int))
+    for k in range(int(which.max(initial=-1)) + 1):
+        yield np.flatnonzero(which == k)
+
+
+def _part(const: np.ndarray, some: slice | np.ndarray) -> np.ndarray:
+    """Constants at some of the times."""
+    if const.dtype != object or isinstance(some, slice):
+        return const
+    out = const.copy()
+    for k, a in enumerate(const):
+        out[k] = a[some] if isinstance(a, np.ndarray) else a
+    return out
 
 
 def step_may_be_brief(step: Step, steps: Sequence[Step]) -> bool:

@@ -11,7 +11,8 @@ from ...constraints.switches.guard_kinds import BY_RATE, HELD
 from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
 from ...errors import AnalysisError
-from ...laws.bytecode import STACK_RESERVE, evaluate, evaluate_over_time, takes_arrays
+from ...laws.bytecode import STACK_RESERVE, evaluate
+from ...laws.interval_evaluation import evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
