@@ -194,5 +194,15 @@ def test_a_loop_and_a_coupling_are_refused_by_name():
         m.simulate(0.1)
 
 
+def test_a_coordinate_that_follows_from_another_is_refused():
+    m = fb.Mechanism("jack", gravity=(0, 0, -9.81))
+    m.add(fb.Body("nut", mass=1, inertia=(0.1, 0.1, 0.1)))
+    m.add(fb.Screw("S", "ground", "nut", at=(0, 0, 0), axis=(0, 0, 1), lead=0.01))
+    c = fb.GravityCompensatedPD("pd", coordinates=["S.angle", "S.displacement"], reference=0, kp=1, kd=1)
+    m.add(c)
+    with pytest.raises(fb.ModelError, match=r"pd'.*(S.displacement follows from|adds constraint equations)"):
+        driven(m, c).simulate(0.1)
+
+
 def test_examples_of_the_page_run():
     assert_examples_run("controllers.md", 14)

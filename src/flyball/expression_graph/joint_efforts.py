@@ -7,7 +7,6 @@ rates of the joints as symbols.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -142,8 +141,11 @@ def _controlled_velocities(s: Structure, e: JointController) -> list[int]:
             f"{e.title}: its model has coordinates that it does not control: {', '.join(free)}; add them to "
             f"coordinates, or leave the bodies that move along them out of the model, ignored=[...]"
         )
-    places: Mapping[str, int] = {n: d for d, n in enumerate(names)}
-    return [places[c] for c in e.coordinates]
+    if other := [c for c in e.coordinates if c not in names]:
+        raise ModelError(
+            f"{e.title}: {', '.join(other)} follows from other coordinates of its model; control {', '.join(names)}"
+        )
+    return [names.index(c) for c in e.coordinates]
 
 
 def law_tree(x: Any) -> SyntaxNode:
