@@ -11,6 +11,7 @@ import numpy as np
 import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.simulation.impulse_stepping.setup import make_stepper, movers_of_assembly, partition_bodies
+from flyball.simulation.impulse_stepping.step_size import choose_step
 from flyball.tables.contact_tables import contact_tables
 
 
@@ -77,7 +78,8 @@ class Run:
         found = partition_bodies(model, values)
         scene = contact_tables(model, values.given, (*found.free, *found.held))
         self.scene = scene
-        self.stepper = make_stepper(scene, movers_of_assembly(scene, base), values, options)
+        movers = movers_of_assembly(scene, base)
+        self.stepper = make_stepper(scene, movers, values, options, choose_step(options, scene, movers, values))
 
     def step(self) -> float:
         """One step; its CPU seconds."""

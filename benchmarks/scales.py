@@ -18,7 +18,7 @@ import runpy
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -73,27 +73,13 @@ def cases(seeds: int) -> Iterator[tuple[str, Callable[[], Made]]]:
 
 def _example(path: Path) -> Made:
     m = fb.load(path) if path.suffix == ".toml" else runpy.run_path(str(path))["mechanism"]()
-    # steps by impulses have a width and a tolerance in units: they are given, so that they can be converted
-    contact = any(isinstance(e, fb.Contact) for e in m.elements())
-    return m, SPAN, {"method": fb.Stepping(step=0.005)} if contact else {}
+    return m, SPAN, {"method": "impulse"} if any(isinstance(e, fb.Contact) for e in m.elements()) else {}
 
 
 def _random(family: str, seed: int) -> Made:
     case = verdicts.made(family, seed)
     dropped = ("outputs", "max_steps")
-    options = {k: v for k, v in case.options.items() if k not in dropped}
-    if family in scenes.SCENES and "method" not in options:
-        options |= _stepping(case.mechanism, case.t_end)
-    return case.mechanism, case.t_end, options
-
-
-def _stepping(m: fb.Mechanism, t_end: float) -> dict[str, Any]:
-    """Step and tolerance of impulse time stepping where it is chosen: the default ones are in units."""
-    try:
-        method = m.simulate(t_end, progress=False).health.options.get("method")
-    except fb.FlyballError:
-        return {}
-    return {"method": fb.Stepping(step=fb.Stepping.usual)} if isinstance(method, Mapping) else {}
+    return case.mechanism, case.t_end, {k: v for k, v in case.options.items() if k not in dropped}
 
 
 NOT_CONVERTED = {
@@ -130,8 +116,9 @@ def in_units(options: dict[str, Any], s: Scale) -> dict[str, Any]:
         for name in ("alpha", "beta"):
             out[name] = (out.get(name) or BAUMGARTE_RATE) / s.time
     if isinstance(method := out.get("method"), fb.Stepping):
-        tolerance = method.tolerance * s.length / s.time
-        out["method"] = dataclasses.replace(method, step=method.longest * s.time, tolerance=tolerance)
+        units = {"step": s.time, "tolerance": s.length / s.time}
+        given = {k: getattr(method, k) * x for k, x in units.items() if getattr(method, k) is not None}
+        out["method"] = dataclasses.replace(method, **given)
     return out
 
 
@@ -149,6 +136,7 @@ def answers(m: fb.Mechanism, t_end: float, options: dict[str, Any], s: Scale) ->
     out["event times"] = np.array([e.t for e in run.events]) / s.time
     out["energy lost"] = np.array([e.lost for e in run.events]) / s.of("J")
     out["counts"] = [run.health.steps, run.health.rejected]
+    out["method"] = run.health.method.partition(":")[0]
     out["warnings"] = len(run.health.warnings)
     return out
 

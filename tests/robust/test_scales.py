@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import scales
 from fuzzing import content, scenes
 
-import flyball as fb
 from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
 from flyball.derivatives.force_balance import residual_rounding
 
@@ -35,9 +34,19 @@ def test_a_motion_in_other_units_is_the_same_to_the_last_bit(name):
     m, t_end, options = CASES[name]()
     own = scales.answers(scales.scaled(m, scales.Scale()), t_end, options, scales.Scale())
     assert name in RANDOM or "error" not in own
-    assert name not in STEPPED or isinstance(options["method"], fb.Stepping)
+    assert name not in STEPPED or own["method"].startswith("impulse time stepping")
     for s in (SMALL_SLOW, LARGE_FAST):
         assert not scales.differences(own, scales.answers(scales.scaled(m, s), t_end * s.time, options, s))
+
+
+@pytest.mark.parametrize("name", ["dropped 0", "colliding 0", "thrown 0", "jointed 0"])
+def test_default_steps_and_tolerances_scale_with_the_scene(name):
+    m, t_end, _ = CASES[name]()
+    own = scales.answers(scales.scaled(m, scales.Scale()), t_end, {"method": "impulse"}, scales.Scale())
+    for s in (SMALL_SLOW, LARGE_FAST):
+        assert not scales.differences(
+            own, scales.answers(scales.scaled(m, s), t_end * s.time, {"method": "impulse"}, s)
+        )
 
 
 QUICK = ("assemble", "mobility", "kinematics", "linearize", "modes", "singularities", "sensitivity instant")

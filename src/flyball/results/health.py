@@ -38,6 +38,10 @@ class ContactHealth:
         Largest residual impulse relative to the largest impulse of its solve.
     tolerance : float [m/s]
         Tolerance of the residual.
+    step : float [s]
+        Longest step; steps are shortened so that they end at the output times.
+    step_reason : str
+        Why this step.
     solves, iterations, unconverged : int
         Number of velocity solves, of all iterations, and of solves stopped with a residual larger than the velocity
         that gravity adds in a step.
@@ -60,6 +64,8 @@ class ContactHealth:
     residual: float = 0.0
     force_residual: float = 0.0
     tolerance: float = 0.0
+    step: float = 0.0
+    step_reason: str = ""
     solves: int = 0
     iterations: int = 0
     unconverged: int = 0
@@ -76,6 +82,8 @@ class ContactHealth:
         out = [("contact", f"{self.most} contacts at most")]
         if self.solver:
             out.append(("contact solver", self.solver))
+        if self.step:
+            out.append(("contact step", f"at most {self.step:.3g} s, {self.step_reason}"))
         if self.impacts:
             out.append(("impacts", self.impacts))
         out.append(("worst overlap", f"{self.worst_overlap:.2g} m"))

@@ -221,9 +221,11 @@ class Stepping:
     Parameters
     ----------
     step : float or str [s], optional
-        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms, or
-        ``max_step`` if that is less, and where compliant contacts collide steps are divided until they resolve the
-        impact.
+        Longest step; steps are shortened so that they end at the output times. If not given it is 0.05 size / speed,
+        or ``max_step`` if that is less, and where compliant contacts collide steps are divided until they resolve the
+        impact. The size is the median radius of the bodies that have shapes (else a tenth of the mechanism's length),
+        the speed is sqrt(g size), or half the speed of the fastest body at the start if that is more: 5 ms for bodies
+        of 0.1 m. ``run.health.contact`` states it.
     solver : str
         Solver of the cone problem: ``auto`` (chosen for each island of bodies in contact), or one by name: see
         ``docs/contact_solvers.md``.
@@ -231,9 +233,9 @@ class Stepping:
         Largest number of iterations of the velocity solve; by default it depends on the solver.
     position_iterations : int, optional
         Largest number of iterations of the position solve; by default it depends on the solver.
-    tolerance : float [m/s]
-        Residual of the velocities at which iterations stop. In very short steps it is a hundredth of the velocity that
-        gravity adds in the step, where that is less.
+    tolerance : float [m/s], optional
+        Residual of the velocities at which iterations stop; 1e-5 of that speed if not given. In very short steps it is
+        a hundredth of the velocity that gravity adds in the step, where that is less.
     coulomb : bool
         Whether to use Coulomb's law. If not, the convex approximation is solved, in which sliding bodies separate by
         friction coefficient times sliding speed times step.
@@ -248,12 +250,12 @@ class Stepping:
     solver: str = "auto"
     iterations: int | None = None
     position_iterations: int | None = None
-    tolerance: float = 1e-5
+    tolerance: float | None = None
     coulomb: bool = True
     restitution: str = "poisson"
     impacts: str = "simultaneous"
 
-    usual: ClassVar[float] = 5e-3  # default longest step [s]
+    limit: ClassVar[float] = math.inf  # of the default step [s]: max_step
 
     def __post_init__(self) -> None:
         if isinstance(self.step, str):
@@ -283,15 +285,10 @@ class Stepping:
                 f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"
             )
 
-    @property
-    def longest(self) -> float:
-        """The longest step [s]."""
-        return self.usual if self.step is None else float(self.step)
-
     def bounded(self, longest: float) -> Stepping:
         """Return the options with steps of at most ``longest`` seconds; default steps may still be divided."""
-        if longest >= self.longest:
-            return self
-        made = dataclasses.replace(self, step=None if self.step is None else longest)
-        object.__setattr__(made, "usual", longest)
+        if self.step is not None:
+            return dataclasses.replace(self, step=min(float(self.step), longest))
+        made = dataclasses.replace(self)
+        object.__setattr__(made, "limit", longest)
         return made

@@ -183,9 +183,8 @@ class ImpulseMotion:
     def __init__(
         self, model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, inputs: Sequence[str]
     ) -> None:
-        base, scene, self.stepper, self.held = begin_by_impulses(model, t, o, parameters)
+        base, scene, self.stepper, self.held, self.chosen = begin_by_impulses(model, t, o, parameters)
         self.stepper.state.times.now = t
-        self.longest = o.longest
         self.structure = base.compiled.structure
         self._reference = base.q.copy()
         first = {k: scene.carriers.slices[k].start for k in self.structure.place if k in scene.carriers.slices}
@@ -237,7 +236,7 @@ class ImpulseMotion:
             If the stepping cannot continue.
         """
         now = float(self.stepper.state.times.now)
-        steps = max(1, math.ceil((t - now) / self.longest * (1.0 - 1e-9)))
+        steps = max(1, math.ceil((t - now) / self.chosen.step * (1.0 - 1e-9)))
         try:
             self.stepper.run(steps, (t - now) / steps)
         except NoSolution:

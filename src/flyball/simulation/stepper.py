@@ -114,6 +114,9 @@ class Stepper:
         self.method = _way_of_motion(self._model, o)
         count = o.copies or 1
         self._described = [self._begin(self._model, {}) for _ in range(count)]
+        first = self._described[0].motion
+        if isinstance(first, ImpulseMotion):
+            self.method += f"; steps of {first.chosen.text}"
         self._copies = list(self._described)
         self._inputs = np.tile(self._usual, (count, 1))
         self._outputs = np.zeros((count, len(self.output_names)))

@@ -37,9 +37,9 @@ from ..simulation.impulse_stepping.setup import (
     movers_of_assembly,
     partition_bodies,
     separate_mechanism,
-    smallest_radius,
     values_with_stops,
 )
+from ..simulation.impulse_stepping.step_size import StepSize, smallest_radius
 from ..simulation.impulse_stepping.stepper import ImpulseStepper, NoSolution
 from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping
@@ -92,18 +92,14 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
     size, rate = smallest_radius(scene, values), float(base.compiled.work.options.rate)
     fall = float(np.linalg.norm(values.system.gravity)) or size * rate * rate
     h = STEP_FRACTION * math.sqrt(size / fall)
-    o = Stepping(
-        step=h,
-        tolerance=VELOCITY_RESIDUAL * fall * h,
-        iterations=SETTLING_ITERATIONS,
-        position_iterations=SETTLING_ITERATIONS,
-    )
+    o = Stepping(step=h, iterations=SETTLING_ITERATIONS, position_iterations=SETTLING_ITERATIONS)
+    chosen = StepSize(h, VELOCITY_RESIDUAL * fall * h, "")
     still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)
     if held:
         own = held.start.assembly.compiled
         held.joints.clock.y.current[: own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
     try:
-        stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, held)
+        stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, chosen, held)
         stepper.state.options.restitution_law = NO_RESTITUTION
         _Settling(scene, stepper, held, h, base).walk(model.name)
     except NoSolution:

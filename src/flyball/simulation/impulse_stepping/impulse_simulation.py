@@ -42,11 +42,11 @@ from .setup import (
     place_body_sets,
     place_movers,
     separate_mechanism,
-    smallest_radius,
     values_with_stops,
     with_earlier_energy,
 )
 from .step_loop import solver_counts
+from .step_size import StepSize, choose_step, smallest_radius
 from .stepper import ImpulseStepper, NoSolution
 from .stepping_tables import (
     RunSums,
@@ -209,6 +209,7 @@ def make_impulse_result(
     recorder: OutputRecorder,
     contact_bodies: ContactBodies,
     o: Stepping,
+    chosen: StepSize,
     since: float,
     message: str,
 ) -> Result:
@@ -217,7 +218,7 @@ def make_impulse_result(
     q, v, vdot = free_coordinates(base, scene, recorder)
     t = np.array(recorder.t)
     counts = stepper.state.counts
-    contact = _contact_health(scene, stepper, o, smallest_radius(scene, values))
+    contact = _contact_health(stepper, o, chosen, smallest_radius(scene, values))
     health = Health(
         success=message == END_MESSAGE,
         message=message,
@@ -262,7 +263,7 @@ def _solvers_in_words(stepper: ImpulseStepper, solver: str) -> str:
     return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 
-def _contact_health(scene: ContactTables, stepper: ImpulseStepper, o: Stepping, size: float) -> ContactHealth:
+def _contact_health(stepper: ImpulseStepper, o: Stepping, chosen: StepSize, size: float) -> ContactHealth:
     worst, counts = stepper.state.worst, stepper.state.counts
     return ContactHealth(
         solver=_solvers_in_words(stepper, o.solver),
@@ -272,7 +273,9 @@ def _contact_health(scene: ContactTables, stepper: ImpulseStepper, o: Stepping, 
         overlap_at_start=max(0.0, -float(worst.overlap_at_start)),
         residual=float(worst.residual),
         force_residual=float(worst.force_residual),
-        tolerance=o.tolerance,
+        tolerance=chosen.tolerance,
+        step=chosen.step,
+        step_reason=chosen.reason,
         solves=int(counts.steps_taken),
         iterations=int(counts.iterations),
         unconverged=int(counts.unconverged),
@@ -302,6 +305,7 @@ class ImpulseMotion(NamedTuple):
     scene: ContactTables
     stepper: ImpulseStepper
     held: MechanismMotion | None  # the jointed mechanism
+    chosen: StepSize
 
 
 def begin_by_impulses(
@@ -327,8 +331,9 @@ def begin_by_impulses(
     at = place_movers(scene, body_states(drawn)) if drawn else movers_of_assembly(scene, base)
     if before is not None:
         place_body_sets(scene, at, before)
+    chosen = choose_step(o, scene, at, values, held.start if held else None, before.health if before else None)
     try:
-        return ImpulseMotion(base, scene, make_stepper(scene, at, values, o, held), held)
+        return ImpulseMotion(base, scene, make_stepper(scene, at, values, o, chosen, held), held, chosen)
     except NoSolution:
         raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
 
@@ -354,22 +359,24 @@ def simulate_by_impulses(
     """
     since, part = time.perf_counter(), part or whole_motion()
     model = model.snapshot()
-    base, scene, stepper, held = begin_by_impulses(model, span[0], o, parameters, before)
+    base, scene, stepper, held, chosen = begin_by_impulses(model, span[0], o, parameters, before)
     names = [*scene.carriers.names, "ground"]
     counts = [-1 if n in scene.carriers.single or n == "ground" else _set_size(scene, n) for n in names]
     sides = ContactBodies(names, counts)
     kept = OutputRecorder(stepper, held, np.arange(len(scene.carriers.mass) + 1))
     part.begin_by_impulses(len(scene.carriers.mass))
     try:
-        interrupted = step_to_outputs(stepper, span, times, o, kept, report, part)
+        interrupted = step_to_outputs(stepper, span, times, chosen.step, kept, report, part)
     except NoSolution:
-        result = with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, ""), before, part)
+        made = make_impulse_result(base, scene, stepper, kept, sides, o, chosen, since, "")
+        result = with_earlier_energy(made, before, part)
         t = float(stepper.state.times.now)
         result.health.message = f"{model.name!r} cannot continue at t = {t:.6g} s: {NO_WAY_MESSAGE}"
         raise SimulationError(result.health.message, result, t) from None
     message = INTERRUPTED_MESSAGE if interrupted else PAUSED_MESSAGE if part.paused else END_MESSAGE
     message = message.format(float(stepper.state.times.now))
-    return with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, message), before, part)
+    made = make_impulse_result(base, scene, stepper, kept, sides, o, chosen, since, message)
+    return with_earlier_energy(made, before, part)
 
 
 def _set_size(scene: ContactTables, name: str) -> int:
@@ -381,14 +388,14 @@ def step_to_outputs(
     stepper: ImpulseStepper,
     span: tuple[float, float],
     times: np.ndarray,
-    o: Stepping,
+    longest: float,
     recorder: OutputRecorder,
     report: ReportProgress,
     part: Segment,
 ) -> bool:
-    """Take steps that end at the output times, as equal as these allow. Returns whether the user interrupted.
+    """Take steps of at most ``longest`` seconds that end at the output times, as equal as these allow.
 
-    At the end of the segment there is always an output row.
+    At the end of the segment there is always an output row. Returns whether the user interrupted.
     """
     first, last = span
     times_of_run, each = stepper.state.times, 1
@@ -398,7 +405,7 @@ def step_to_outputs(
     try:
         for t in (*times[times > first].tolist(), last):
             way = t - float(times_of_run.now)
-            steps = math.ceil(way / o.longest * (1.0 - 1e-9) - 1e-12)
+            steps = math.ceil(way / longest * (1.0 - 1e-9) - 1e-12)
             if steps > 0:
                 stepper.run(1, way / steps)
                 if recorder.t and not recorder.acceleration:

@@ -36,6 +36,7 @@ from ..initial_state import InitialState, find_initial_state, initial_state_at
 from ..integration_intervals import Segment
 from ..integration_options import RESTITUTION_LAWS, Stepping
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
+from .step_size import StepSize, smallest_radius
 from .stepper import ImpulseStepper, free_bodies
 from .stepping_tables import (
     LINE_FRICTION,
@@ -417,13 +418,6 @@ COARSE_FACTOR = 100.0  # factor of the tolerance up to which the residual of an 
 OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 100
 
 
-def smallest_radius(scene: ContactTables, values: Values) -> float:
-    """Return the radius [m] of the smallest shape; the mechanism's length if all are unbounded."""
-    sizes = scene.geometry.dimensions.radius[:]
-    bounded = sizes[np.isfinite(sizes)]
-    return float(bounded.min() if len(bounded) else values.length)
-
-
 def movers_of_assembly(scene: ContactTables, base: Assembly) -> Movers:
     """Return the movers at the assembled positions; sets of bodies are as described."""
     return place_movers(scene, base.compiled.moving(base.t, base.q, base.v))
@@ -440,16 +434,22 @@ def place_movers(scene: ContactTables, bodies: Mapping[str, BodyState]) -> Mover
 
 
 def make_stepper(
-    scene: ContactTables, M: Movers, values: Values, o: Stepping, held: MechanismMotion | None = None
+    scene: ContactTables,
+    M: Movers,
+    values: Values,
+    o: Stepping,
+    chosen: StepSize,
+    held: MechanismMotion | None = None,
 ) -> ImpulseStepper:
-    """Create the stepper at the start."""
+    """Create the stepper at the start, for steps as chosen."""
     planar = values.structure.model.planar
     state = initial_run_state(values.system.gravity)
     options, tolerances = state.options, state.tolerances
     size = smallest_radius(scene, values)
-    tolerances.rebound_speed, tolerances.overlap = SLOW_CONTACT * o.tolerance, NO_OVERLAP * size
-    tolerances.velocity = tolerances.position = o.tolerance
-    tolerances.reported = max(float(np.sqrt((state.gravity**2).sum())), COARSE_FACTOR * o.tolerance / o.longest)
+    tolerances.rebound_speed, tolerances.overlap = SLOW_CONTACT * chosen.tolerance, NO_OVERLAP * size
+    tolerances.velocity = tolerances.position = chosen.tolerance
+    gravity = float(np.sqrt((state.gravity**2).sum()))
+    tolerances.reported = max(gravity, COARSE_FACTOR * chosen.tolerance / chosen.step)
     usual = DEFAULT_ITERATIONS.get(o.solver, OTHER_ITERATIONS)
     options.velocity_iterations = o.iterations or usual
     options.position_iterations = o.position_iterations or max(DEFAULT_POSITION_ITERATIONS, usual // 2)
