@@ -37,10 +37,12 @@ def complex_step_derivative(x: np.ndarray) -> np.ndarray:
     """Derivatives from the imaginary parts of numbers computed with a complex step.
 
     The third-order term leaves COMPLEX_STEP^2 / 6 times the third derivative, even where the first derivative is zero
-    (a cube at 0). Values of this size are set to 0.
+    (a cube at 0), and products of several rounding errors are as small. Derivatives below COMPLEX_STEP times the
+    largest one of ``x`` are set to 0; no units of length, mass and time make numbers of one mechanism differ that much.
     """
     found = np.imag(x) / COMPLEX_STEP
-    return np.where(np.abs(found) <= COMPLEX_STEP, 0.0, found)
+    size = np.abs(found)
+    return np.where(size <= COMPLEX_STEP * size.max(initial=0.0), 0.0, found)
 
 
 def friction_load_rows(s: Structure) -> np.ndarray:
