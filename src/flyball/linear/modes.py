@@ -76,7 +76,10 @@ def _selected_eigenvalues(eigenvalues: Spectrum, count: int | None) -> tuple[np.
     w = eigenvalues.values
     listed = np.array([k for group in eigenvalues.groups for k in group[: eigenvalues.geometric[group[0]]]], int)
     one = listed[w[listed].imag >= 0.0]
-    one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
+    one = one[np.argsort(np.abs(w[one]), kind="stable")]
+    size = np.abs(w[one])
+    rank = np.cumsum(np.diff(size, prepend=size[:1]) > EQUAL_TOLERANCE * size)  # a pair w, -w has the same
+    one = one[np.lexsort((-w[one].real, rank))]
     return one[:count], one[count:] if count is not None else one[:0]
 
 
