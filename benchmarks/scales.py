@@ -51,7 +51,7 @@ ROUNDED = {
     **dict.fromkeys(
         ("linearize", "modes", "kinematics", "inverse_dynamics"), "LAPACK: inverses of matrices that mix units"
     ),
-    "equilibrium": "LAPACK: least squares of forces and gaps; and derivatives below 1e-40 in the units given are 0",
+    "equilibrium": "LAPACK: least squares of forces and gaps",
     **dict.fromkeys(
         ("sensitivity instant", "sensitivity equilibrium", "sensitivity modes"),
         "LAPACK: inverses of matrices that mix units",

@@ -27,12 +27,23 @@ def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
     """Eigenvalues and their derivatives; with sampled controllers the multipliers of one cycle."""
     matrix, unit = _system_matrix(a)
     base = matrix(a.parameters)
-    dA = np.array([difference_derivative(a.model, a.parameters, name, matrix) for name in a.to])
+    units = entry_units(base)
+    dA = np.array([difference_derivative(a.model, a.parameters, name, matrix, units) for name in a.to])
     w, dw = eigenvalue_derivatives(
         base, dA.reshape(len(a.to), *base.shape), lambda k: offset_sample(a.model, a.parameters, a.to[k], matrix)
     )
     of = tuple(f"eigenvalue {k}" for k in range(len(w)))
     return Sensitivity("modes", of, a.to, (unit,) * len(of), {}, np.array([a.t]), w[None], dw[None])
+
+
+def entry_units(A: np.ndarray) -> np.ndarray:
+    """Magnitudes (n, n) in which the entries of a system matrix are comparable: T_i / T_j of the balanced T^-1 A T."""
+    from scipy.linalg import matrix_balance
+
+    if not A.size:
+        return np.ones_like(A)
+    scale = matrix_balance(A, permute=False, separate=True)[1][0]
+    return np.outer(scale, 1.0 / scale)
 
 
 def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:

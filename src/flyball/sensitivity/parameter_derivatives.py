@@ -85,9 +85,11 @@ ParameterFunction = Callable[[Mapping[str, float]], np.ndarray]
 
 
 def difference_derivative(
-    model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
+    model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction, units: np.ndarray
 ) -> np.ndarray:
     """Derivative by a parameter of a function of the parameters, by differences of sixth order.
+
+    ``units`` are magnitudes in which the function's numbers are comparable: the step is the best one for all of them.
 
     Raises
     ------
@@ -100,8 +102,8 @@ def difference_derivative(
         sides = [[found({**parameters, name: value + s * k * h}) for s in (1, -1)] for k in (1, 2, 3)]
         D = np.array([a - b for a, b in sides])
         best, other = (np.tensordot(weights, D, 1) / h for weights in (SIXTH_ORDER, FOURTH_ORDER))
-        error, size = (float(np.abs(X).max(initial=0.0)) for X in (best - other, best))
-        largest = max(float(np.abs(a).max(initial=0.0)) for pair in sides for a in pair)
+        error, size = (float(np.abs(X / units).max(initial=0.0)) for X in (best - other, best))
+        largest = max(float(np.abs(a / units).max(initial=0.0)) for pair in sides for a in pair)
         if error <= AGREEMENT * size:
             error = 0.0
         return error, best, error * h <= DIFFERENCE_ROUNDING * largest
@@ -368,8 +370,11 @@ def initial_changes(
         b = assemble(model, t=base.t, parameters=p)
         return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
 
+    sizes = base.compiled.sizes
+    rate = float(base.compiled.work.options.rate) or float(np.abs(base.v / sizes).max(initial=0.0)) or 1.0
+    units = np.r_[sizes, rate * sizes]
     return [
-        consistent_changes(d, x, lin, *np.split(difference_derivative(model, parameters, d.name, found), 2))
+        consistent_changes(d, x, lin, *np.split(difference_derivative(model, parameters, d.name, found, units), 2))
         for d in directions
     ]
 
