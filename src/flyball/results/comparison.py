@@ -154,7 +154,7 @@ class Comparison:
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Drift and energy over time, and cost; returns the Matplotlib figure, or writes it to ``path``."""
-        from ..view.comparison_plots import comparison_plot
+        from ..view.result_plots import comparison_plot
 
         return comparison_plot(self, path)
 
