@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from subprocess import PIPE
@@ -74,12 +75,30 @@ def compile_all(
         raise OSError("there is no folder that compiled code can be kept in; FLYBALL_CACHE names one")
     folder.mkdir(parents=True, exist_ok=True)
     todo = [k.name for k in missing_kernels(folder, cpus)]
-    total, left, failures = len(todo), todo[::-1], list[str]()
-    ready: list[str] = []
-    lock = Lock()
+    work = _SharedWork(folder, cpus, todo[::-1], len(todo), progress)
+    with ThreadPoolExecutor(max_workers=max(1, min(available_cores(), work.total))) as pool:
+        for future in [pool.submit(work.serve) for _ in range(min(available_cores(), work.total))]:
+            future.result()
+    if work.failures:
+        raise RuntimeError(work.failures[0])
+    return work.total
 
-    def serve() -> None:
-        """Run one process that compiles kernels from the shared list."""
+
+@dataclass
+class _SharedWork:
+    """Kernels to be compiled, from which each process takes the next one."""
+
+    folder: Path
+    cpus: Sequence[str]
+    left: list[str]
+    total: int
+    progress: Callable[[str, int, int], None] | None
+    ready: int = 0
+    failures: list[str] = field(default_factory=list)
+    lock: Lock = field(default_factory=Lock)
+
+    def serve(self) -> None:
+        """Run one process that compiles kernels until none is left or one fails."""
         code = _WORKER.format(path=sys.path)
         process = subprocess.Popen(
             [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1
@@ -87,28 +106,21 @@ def compile_all(
         give, answers = process.stdin, process.stdout
         assert give is not None
         assert answers is not None
-        give.write(f"{folder}\n{' '.join(cpus)}\n")
-        while not failures:
-            with lock:
-                name = left.pop() if left else None
+        give.write(f"{self.folder}\n{' '.join(self.cpus)}\n")
+        while not self.failures:
+            with self.lock:
+                name = self.left.pop() if self.left else None
             if name is None:
                 break
             give.write(f"{name}\n")
             if answers.readline().strip() != name:
-                failures.append(f"{name} cannot be compiled: {process.communicate()[1][-1000:]}")
+                self.failures.append(f"{name} cannot be compiled: {process.communicate()[1][-1000:]}")
                 return
-            with lock:
-                ready.append(name)
-                if progress is not None:
-                    progress(name, len(ready), total)
+            with self.lock:
+                self.ready += 1
+                if self.progress is not None:
+                    self.progress(name, self.ready, self.total)
         process.communicate()
-
-    with ThreadPoolExecutor(max_workers=max(1, min(available_cores(), total))) as pool:
-        for future in [pool.submit(serve) for _ in range(min(available_cores(), total))]:
-            future.result()
-    if failures:
-        raise RuntimeError(failures[0])
-    return total
 
 
 def available_cores() -> int:

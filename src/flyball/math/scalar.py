@@ -273,37 +273,55 @@ def quintic_rise(s):
 @when_compiling
 def _register() -> None:
     """Register the compiled versions of these functions for real and complex numbers."""
+    _register_analytic_functions()
+    _register_choices()
+    _register_functions_of_two_numbers()
+
+
+def _overload_analytic(function: Function, name: str) -> None:
     from numba import types
 
     from ..compiler.numba_target import overload
 
-    def analytic(function: Function, name: str) -> None:
-        real, complex_ = getattr(math, name), getattr(cmath, name)
+    real, complex_ = getattr(math, name), getattr(cmath, name)
 
-        @overload(function)
-        def choose(x):
-            return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
+    @overload(function)
+    def choose(x):
+        return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
 
+
+def _overload_stepped(function: Function, real: Function, complex_: Function) -> None:
+    """Overload a function whose complex argument carries a first-order step."""
+    from numba import types
+
+    from ..compiler.numba_target import overload
+
+    @overload(function)
+    def choose(x):
+        return complex_ if isinstance(x, types.Complex) else real
+
+
+def _overload_either(function: Function, real: Function, complex_: Function) -> None:
+    """Overload a function of two numbers, of which one or both may be complex."""
+    from numba import types
+
+    from ..compiler.numba_target import overload
+
+    @overload(function)
+    def choose(a, b):
+        return complex_ if isinstance(a, types.Complex) or isinstance(b, types.Complex) else real
+
+
+def _register_analytic_functions() -> None:
     for function, name in _ANALYTIC.items():
         if function not in (sin, cos, tan, atan, tanh, sqrt):
-            analytic(function, name)
-
-    def stepped(function: Function, real: Function, complex_: Function) -> None:
-        """Overload a function whose complex argument carries a first-order step."""
-
-        @overload(function)
-        def choose(x):
-            return complex_ if isinstance(x, types.Complex) else real
+            _overload_analytic(function, name)
 
     def complex_sqrt(x):
         if not x.real > 0.0:
             return cmath.sqrt(x)
         root = math.sqrt(x.real)
         return complex(root, 0.5 * x.imag / root)
-
-    stepped(sin, lambda x: math.sin(x), lambda x: complex(math.sin(x.real), x.imag * math.cos(x.real)))
-    stepped(cos, lambda x: math.cos(x), lambda x: complex(math.cos(x.real), -x.imag * math.sin(x.real)))
-    stepped(sqrt, lambda x: math.sqrt(x), complex_sqrt)
 
     def complex_tan(x):
         t = math.tan(x.real)
@@ -313,25 +331,20 @@ def _register() -> None:
         c = math.cosh(x.real)
         return complex(math.tanh(x.real), x.imag / (c * c))
 
+    stepped = _overload_stepped
+    stepped(sin, lambda x: math.sin(x), lambda x: complex(math.sin(x.real), x.imag * math.cos(x.real)))
+    stepped(cos, lambda x: math.cos(x), lambda x: complex(math.cos(x.real), -x.imag * math.sin(x.real)))
+    stepped(sqrt, lambda x: math.sqrt(x), complex_sqrt)
     stepped(tan, lambda x: math.tan(x), complex_tan)
     stepped(tanh, lambda x: math.tanh(x), complex_tanh)
     stepped(atan, lambda x: math.atan(x), lambda x: complex(math.atan(x.real), x.imag / (1.0 + x.real * x.real)))
 
-    def either(function: Function, real: Function, complex_: Function) -> None:
-        """Overload a function of two numbers, of which one or both may be complex."""
 
-        @overload(function)
-        def choose(a, b):
-            return complex_ if isinstance(a, types.Complex) or isinstance(b, types.Complex) else real
+def _register_choices() -> None:
+    """Register the functions that compare, round and choose, by real parts."""
+    from numba import types
 
-    def complex_atan2(y, x):
-        turned, square = x.real * y.imag - y.real * x.imag, x.real * x.real + y.real * y.real
-        return complex(math.atan2(y.real, x.real), turned / square if turned != 0.0 else 0.0)
-
-    @overload(atan2)
-    def choose_atan2(y, x):
-        is_complex = isinstance(y, types.Complex) or isinstance(x, types.Complex)
-        return complex_atan2 if is_complex else (lambda y, x: math.atan2(y, x))
+    from ..compiler.numba_target import overload
 
     @overload(absolute)
     def choose_absolute(x):
@@ -373,6 +386,12 @@ def _register() -> None:
     def choose_unless_zero(x, a, b):
         return lambda x, a, b: a if x.real != 0.0 else b
 
+
+def _register_functions_of_two_numbers() -> None:
+    def complex_atan2(a, b):
+        turned, square = b.real * a.imag - a.real * b.imag, b.real * b.real + a.real * a.real
+        return complex(math.atan2(a.real, b.real), turned / square if turned != 0.0 else 0.0)
+
     def least(a, b):
         return a if a.real <= b.real or a != a else b
 
@@ -386,7 +405,8 @@ def _register() -> None:
         f = a.real / b.real
         return complex(f, (a.imag - f * b.imag) / b.real)
 
-    either(minimum, least, least)
-    either(maximum, most, most)
-    either(divide, quotient, complex_quotient)
-    either(power, lambda a, b: math.pow(a, b), lambda a, b: _complex_power(complex(a), complex(b)))
+    _overload_either(atan2, lambda a, b: math.atan2(a, b), complex_atan2)
+    _overload_either(minimum, least, least)
+    _overload_either(maximum, most, most)
+    _overload_either(divide, quotient, complex_quotient)
+    _overload_either(power, lambda a, b: math.pow(a, b), lambda a, b: _complex_power(complex(a), complex(b)))

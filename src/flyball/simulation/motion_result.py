@@ -95,6 +95,24 @@ def missing_accelerations(c: CompiledMechanism, rows: np.ndarray) -> str:
     )
 
 
+def _how_it_ended(here: EventContext, o: Integration, interrupted: bool) -> tuple[str, BaseException | None]:
+    """Return the message on how the motion ended, and the error behind it if there is one."""
+    a, clock = here.start.assembly, here.clock
+    status, t = int(clock.count.status), float(clock.real.t)
+    if interrupted:
+        return f"interrupted by the user at t = {t:.6g} s; the motion so far is kept", here.failed
+    if here.start.part.paused:
+        return PAUSED_MESSAGE.format(t), here.failed
+    if here.failed is not None:
+        broken = _cause_of_failed_step(a, clock) if status == ex.STEP_FAILED else ""
+        name = here.start.base.compiled.structure.model.name
+        kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
+        return f"{name!r}: {broken or here.failed}. {kept}", here.failed
+    if status != ex.DONE:
+        return failure_reason(a, here.start.base, clock, method=str(o.method))
+    return here.stopped or "reached the end", None
+
+
 def make_result(
     here: EventContext,
     rows: np.ndarray,
@@ -117,18 +135,7 @@ def make_result(
     a, model = start.assembly, start.base.compiled.structure.model
     status = int(clock.count.status)
     t = float(clock.real.t)
-    message, cause = here.stopped or "reached the end", here.failed
-    if interrupted:
-        message = f"interrupted by the user at t = {t:.6g} s; the motion so far is kept"
-    elif here.start.part.paused:
-        message = PAUSED_MESSAGE.format(t)
-    elif here.failed is not None:
-        broken = _cause_of_failed_step(a, clock) if status == ex.STEP_FAILED else ""
-        message = (
-            f"{model.name!r}: {broken or here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
-        )
-    elif status != ex.DONE:
-        message, cause = failure_reason(a, start.base, clock, method=str(o.method))
+    message, cause = _how_it_ended(here, o, interrupted)
     health = _health(start, clock, o)
     ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE

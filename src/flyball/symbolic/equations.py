@@ -448,6 +448,17 @@ class EquationDisplay:
         return notebook_iframe(self.html())
 
 
+def _refuse_inputs(balanced_by: Sequence[str], inputs: Sequence[str]) -> None:
+    """Refuse inputs among the parameters that balance the operating point."""
+    for name in balanced_by:
+        if name in inputs:
+            raise ModelError(
+                f"balanced_by names {name!r}, an input, which is what is added at the point: let its element "
+                f"have a parameter of its own ({name!r} with torque='tau' or force='F', 'tau' and 'F' among the "
+                f"mechanism's parameters), and name that: balanced_by=['tau']"
+            )
+
+
 class Linearization:
     """The linear part of `Equations`."""
 
@@ -495,13 +506,7 @@ class Linearization:
         """
         from .linear.linear_equations import LinearizationOptions, linearize_about
 
-        for name in balanced_by:
-            if name in self._options.inputs:
-                raise ModelError(
-                    f"balanced_by names {name!r}, an input, which is what is added at the point: let its element "
-                    f"have a parameter of its own ({name!r} with torque='tau' or force='F', 'tau' and 'F' among the "
-                    f"mechanism's parameters), and name that: balanced_by=['tau']"
-                )
+        _refuse_inputs(balanced_by, self._options.inputs)
         if isinstance(at, Mapping):
             at = {_rate(name): x for name, x in at.items()}
 

@@ -442,19 +442,23 @@ def check_element(
     checks = CHECKS[element.category]
     if unknown := set(skip) - set(checks):
         raise ModelError(f"{sorted(unknown)} is no part of the contract; its parts are {', '.join(checks)}")
+    asked = [name for name in checks if name not in skip]
     _refuse_incomplete(element)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # the joint may change positions and velocities of its bodies
         subject = _subject(element, mechanism, parameters)
-        for name, check in checks.items():
-            if name not in skip:
-                try:
-                    wrong = check(subject)
-                except FlyballError as error:
-                    wrong = f"{type(error).__name__}: {error}"
-                if wrong:
-                    raise ContractError(f"{element.title} fails the check {name!r}: {wrong}")
-    return [name for name in checks if name not in skip]
+        for name in asked:
+            if wrong := _failure(checks[name], subject):
+                raise ContractError(f"{element.title} fails the check {name!r}: {wrong}")
+    return asked
+
+
+def _failure(check: Callable[[Any], str | None], subject: Any) -> str | None:
+    """Return what a check finds wrong, or the error that it meets."""
+    try:
+        return check(subject)
+    except FlyballError as error:
+        return f"{type(error).__name__}: {error}"
 
 
 def _refuse_incomplete(e: Force | Joint | ConvexSolid) -> None:

@@ -127,7 +127,15 @@ def pack_recording(recording: Recording) -> bytes:
     """
     check_recording(recording)
     block = _NumberBlock()
-    header = {
+    header = _header(recording, block)
+    text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
+    head = struct.pack("<I", len(text)) + text
+    return head + bytes(-len(head) % ALIGNMENT) + b"".join(block.parts)
+
+
+def _header(recording: Recording, block: _NumberBlock) -> dict[str, Any]:
+    """Return a recording as plain data; its numbers are added to the block."""
+    return {
         "name": recording.name,
         "planar": bool(recording.planar),
         "size": float(recording.size),
@@ -176,9 +184,6 @@ def pack_recording(recording: Recording) -> bytes:
             for f in recording.figures
         ],
     }
-    text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
-    head = struct.pack("<I", len(text)) + text
-    return head + bytes(-len(head) % ALIGNMENT) + b"".join(block.parts)
 
 
 def _optional_float(value: float | None) -> float | None:

@@ -367,21 +367,17 @@ def runge_kutta(
     matrix = np.array([np.pad(row, (0, s - len(row))) for row in rows]).reshape(s, s)
     weights, c = np.asarray(b, float), matrix.sum(axis=1)
     _check_order(who, matrix, weights, order, order)
+    full = np.pad(np.vstack([matrix, weights]), ((0, 0), (0, 1)))
     E = np.zeros((2, s + 1))
     if embedded is not None:
         if len(embedded) not in (s, s + 1):
             raise ModelError(f"{who}: embedded must have {s} or {s + 1} numbers, got {len(embedded)}")
         other = np.pad(np.asarray(embedded, float), (0, s + 1 - len(embedded)))
-        whole = np.pad(np.vstack([matrix, weights]), ((0, 0), (0, 1)))
-        _check_order(f"{who}, embedded", whole, other, order - 1, order)
+        _check_order(f"{who}, embedded", full, other, order - 1, order)
         E[0] = np.append(weights, 0.0) - other
-    full = np.pad(np.vstack([matrix, weights]), ((0, 0), (0, 1)))
     P = _cubic_hermite(who, weights, order) if dense is None else np.array(dense, float)
-    if (
-        P.ndim != 2
-        or len(P) != s + 1
-        or not np.allclose(P.sum(axis=1), [*weights, 0.0], rtol=0.0, atol=COEFFICIENT_TOLERANCE)
-    ):
+    sums = P.sum(axis=1) if P.ndim == 2 else P
+    if P.ndim != 2 or len(P) != s + 1 or not np.allclose(sums, full[-1], rtol=0.0, atol=COEFFICIENT_TOLERANCE):
         raise ModelError(f"{who}: dense must have {s + 1} rows whose sums are the weights b, and 0")
     sizes = np.array([order, s, s + 1], np.int64)
     made = Tableau(full, np.append(c, 1.0), E, np.ascontiguousarray(P), np.zeros((2, s + 1)), sizes)
