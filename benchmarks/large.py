@@ -16,7 +16,7 @@ from typing import Any
 import timing
 
 import flyball as fb
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 
 PARTS = ("build", "write", "read", "first", "again", "check")
 COLUMNS = {"model": "model", "kilobytes": "file [kB]", **{p: f"{p} [s]" for p in PARTS}}

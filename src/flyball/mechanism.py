@@ -45,7 +45,7 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
             from .robots.urdf_writer import save_urdf
 
             return save_urdf(self, Path(path))
-        from .model.toml_file import save
+        from .model.model_files import save
 
         return save(self, path)
 
@@ -93,7 +93,7 @@ def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
     except TypeError:
         raise ModelError(f"the path of a model file is a text or a path, not {path!r}") from None
     if given.suffix.lower() == ".py":
-        from .model.python_file import load_python
+        from .model.model_files import load_python
 
         return load_python(given, Mechanism)
     if given.suffix.lower() in (".xml", ".mjcf"):
@@ -104,7 +104,7 @@ def load(path: str | os.PathLike, *, floating: bool = False) -> Mechanism:
         from .robots.urdf import load_urdf
 
         return load_urdf(given, Mechanism, floating)
-    from .model.toml_file import load
+    from .model.model_files import load
 
     if floating:
         raise ModelError(f"{given}: floating=True is for robots in URDF; add or leave out the joints to ground here")

@@ -7,7 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball.assembly import positions_and_velocities
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 from flyball.results.health import InitialDeviation
 from tests.layers import LAYERS, started, take
 

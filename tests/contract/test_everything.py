@@ -11,7 +11,7 @@ from flyball.engine.entry_point import MOTION
 from flyball.engine.motion import derivative
 from flyball.model.controller import IMU, Sensor
 from flyball.model.joint import Coupling
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 from tests.layers import both_layers, started
 
 pytestmark = both_layers

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball.engine.entry_point import MOTION
 from flyball.engine.motion import derivative
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 from tests.contract.zoo import (
     CASES,
     GRAVITY,

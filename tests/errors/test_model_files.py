@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flyball as fb
+from flyball.model.model_files import loads
 from flyball.model.snapshot import CATEGORIES
-from flyball.model.toml_file import loads
 
 BODY = '[[bodies]]\nname = "crank"\nmass = 1\ninertia = [1, 1, 1]\n'
 
@@ -135,7 +135,7 @@ fields = st.sampled_from(
     planar=st.booleans(),
 )
 def test_nothing_but_a_model_error_ever_comes_out(category: str, table: dict, kind: str, planar: bool) -> None:
-    from flyball.model.toml_file import _value
+    from flyball.model.model_files import _value
 
     body = {"name": "b", "mass": 1, "inertia": 1 if planar else [1, 1, 1]}
     table = {"name": "x"} | ({"type": kind} if category in ("joints", "forces") else {}) | table

@@ -8,7 +8,7 @@ import math
 import pytest
 
 import flyball as fb
-from flyball.model.toml_file import _value, dumps, loads
+from flyball.model.model_files import _value, dumps, loads
 
 Z = (0, 0, 1)
 SQUARE = [(1, 0), (0, 1), (-1, 0), (0, -1)]

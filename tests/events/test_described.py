@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import flyball as fb
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 
 PARAMETERS = {"k": 2.0, "c": "3 N*s/m"}
 

@@ -9,7 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.collision import shape_kinds
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 from flyball.tables.contact_tables import ContactTables, contact_tables
 from flyball.tables.element_numbers import element_numbers
 from flyball.tables.table_definitions import ACROSS, KINETIC, RESTITUTION, ROLLING, STATIC

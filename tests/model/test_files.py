@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import flyball as fb
 from flyball.model.element import Element, written_fields
-from flyball.model.toml_file import dumps, loads
+from flyball.model.model_files import dumps, loads
 
 numbers = st.floats(-1e9, 1e9, allow_nan=False)
 positive = st.floats(1e-9, 1e9)

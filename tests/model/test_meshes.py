@@ -13,8 +13,8 @@ import trimesh
 
 import flyball as fb
 from flyball.model.element import resolve
+from flyball.model.model_files import dumps
 from flyball.model.shapes.geometry import polyhedron_integrals
-from flyball.model.toml_file import dumps
 
 TETRAHEDRON = {
     "vertices": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],

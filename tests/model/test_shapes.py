@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball.model.element import Length, element, positive, resolve
 from flyball.model.inertia import mass_properties
+from flyball.model.model_files import dumps, loads
 from flyball.model.shapes import SHAPES
 from flyball.model.shapes.geometry import surface_defects, weld_vertices
 from flyball.model.shapes.solid import Solid
-from flyball.model.toml_file import dumps, loads
 
 ELL = ((0, 0), (2, 0), (2, 1), (0.5, 1), (0.5, 3), (0, 3))
 TETRAHEDRON = {

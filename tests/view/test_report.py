@@ -91,7 +91,7 @@ def test_the_model_file_can_be_read_and_copied(opened: Open, result: Result) -> 
     tab.wait_until(lambda: tab.locator("[data-copy]").inner_text() == "Copied")
     text = tab.locator("#toml").text_content()
     assert tab.evaluate("navigator.clipboard.readText()").rstrip() == text.rstrip()
-    from flyball.model.toml_file import loads
+    from flyball.model.model_files import loads
 
     assert loads(text, fb.Mechanism) == result.model
     assert tomllib.loads(text)["name"] == "slider/crank"

@@ -424,7 +424,7 @@ def _variable_name(name: str) -> str:
 def _write_solution(result: Result, group: Any, folder: Path) -> None:
     """Write the arrays exactly, the model as the text of its file, parameters as used, health as JSON."""
     from .. import __version__
-    from ..model.toml_file import dumps
+    from ..model.model_files import dumps
 
     s = result.values.structure
     group.attrs["format"] = RESULT_FORMAT

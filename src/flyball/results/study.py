@@ -20,8 +20,8 @@ import numpy as np
 from ..errors import AnalysisError, ModelError
 from ..model.messages import listing, suggest
 from ..model.model import Model
+from ..model.model_files import dumps
 from ..model.output_files import RESULT, TABLE, file_extension, write_file
-from ..model.toml_file import dumps
 from .files import OWN_GROUP, SLASH_SUBSTITUTE, is_sealed, sealed_file_bytes, text_type
 from .result import Result
 from .wording import json_numbers, range_text

@@ -13,7 +13,7 @@ import numpy as np
 from ..constraints.switches.guard_kinds import FROZEN, OFF
 from ..model.element import written_fields
 from ..model.joint import Joint
-from ..model.toml_file import dumps
+from ..model.model_files import dumps
 from ..results.events import EventRecord
 from ..results.phases import Moment
 from ..results.wording import tuple_text

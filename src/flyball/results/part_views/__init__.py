@@ -16,9 +16,8 @@ from ...model.force import Force
 from ...model.joint import Coupling, Joint
 from .base import PartView as PartView
 from .bodies import FrameView
-from .drivers_and_sensors import ControllerView, CouplingView, DriverView, IMUView, SensorView
 from .forces import ContactPlaceView, ForceView
-from .joints import JointView
+from .joints import ControllerView, CouplingView, DriverView, IMUView, JointView, SensorView
 
 if TYPE_CHECKING:
     from ..result import Result

@@ -1,4 +1,4 @@
-"""Model files: a mechanism as readable TOML, which is read back exactly.
+"""Model files: a mechanism as readable TOML, which is read back exactly, or described by a Python file.
 
 Numbers are written so that reading restores every bit, and strings ("60 rpm", "2*k") as the user wrote them. An unknown
 table, type or field is refused with the line, the nearest known names and the rule.
@@ -9,12 +9,14 @@ from __future__ import annotations
 import importlib
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from ..errors import ModelError
+from ..errors import FlyballError, ModelError
 from .body import Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, Material, MaterialPair
 from .contact_point import Touch
@@ -355,3 +357,51 @@ def _refuse(error: Exception, where: str) -> NoReturn:
     """Return the error as a ``ModelError`` with the location in the file in front."""
     kind = type(error) if isinstance(error, ModelError) else ModelError
     raise kind(f"{where}: {error}") from None
+
+
+def load_python(path: Path, cls: type[M]) -> M:
+    """Execute a Python file; return its ``m``, ``mechanism`` or ``mechanism()``, a mechanism of class ``cls``.
+
+    Its output is redirected to stderr.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, it fails (with its line), or it defines no mechanism.
+    """
+    import runpy
+
+    if not path.is_file():
+        there = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}")
+    sys.path.insert(0, str(path.resolve().parent))
+    try:
+        with redirect_stdout(sys.stderr):
+            names = runpy.run_path(str(path))
+            found: list[Any] = [names.get(k) for k in ("m", "mechanism")]
+            made = [x if isinstance(x, cls) else x() for x in found if isinstance(x, cls) or callable(x)]
+    except ModelError as error:
+        raise type(error)(f"{path}{_line_in(path, error)}: {error}") from None
+    except FlyballError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ModelError(f"{path}{_line_in(path, error)}: {type(error).__name__}: {error}") from None
+    finally:
+        sys.path.pop(0)
+    for m in made:
+        if isinstance(m, cls):
+            return m
+    raise ModelError(f"{path} defines no mechanism: name one m or mechanism, or define a function mechanism()")
+
+
+def _line_in(path: Path, error: BaseException) -> str:
+    """Return ', line n' of the last line of that file in the error's traceback."""
+    if isinstance(error, SyntaxError) and error.lineno:
+        return f", line {error.lineno}"
+    line = ""
+    trace = error.__traceback__
+    while trace is not None:
+        if os.path.abspath(trace.tb_frame.f_code.co_filename) == os.path.abspath(path):
+            line = f", line {trace.tb_lineno}"
+        trace = trace.tb_next
+    return line
