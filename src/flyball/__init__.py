@@ -143,8 +143,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.table import Table as Table
     from .results.comparison import Comparison as Comparison
     from .results.equilibrium import Equilibrium as Equilibrium
+    from .results.equilibrium import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Touch as Touch
-    from .results.equilibrium_series import EquilibriumSeries as EquilibriumSeries
     from .results.inverse_dynamics import InverseDynamics as InverseDynamics
     from .results.linear_model import LinearModel as LinearModel
     from .results.mechanism_report import MassReport as MassReport
@@ -221,7 +221,7 @@ _HOME = {
     "Report": "results.mechanism_report",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
-    "EquilibriumSeries": "results.equilibrium_series",
+    "EquilibriumSeries": "results.equilibrium",
     "Indices": "results.study",
     "InverseDynamics": "results.inverse_dynamics",
     "LinearModel": "results.linear_model",

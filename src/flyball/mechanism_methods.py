@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from .kinematics.prepared import Prepared
     from .model.model import Model
     from .results.comparison import Comparison
-    from .results.equilibrium import Equilibrium
-    from .results.equilibrium_series import EquilibriumSeries
+    from .results.equilibrium import Equilibrium, EquilibriumSeries
     from .results.inverse_dynamics import InverseDynamics
     from .results.linear_model import LinearModel
     from .results.mechanism_report import MassReport, Report

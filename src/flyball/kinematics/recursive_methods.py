@@ -35,7 +35,7 @@ from ..errors import AnalysisError, ModelError
 from ..model.body import GROUND, Frame
 from ..tables.table_definitions import FREE, SPHERICAL, System
 from .closed_loops import ClosedLoops
-from .state_arrays import quaternion_places, refuse_overflow, refuse_zero_quaternions, state_rows
+from .conventions import quaternion_places, refuse_overflow, refuse_zero_quaternions, state_rows
 
 if TYPE_CHECKING:
     from ..assembly.assembled_state import Assembly

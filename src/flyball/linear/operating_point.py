@@ -23,8 +23,9 @@ from ..model.element import Element
 from ..model.expressions import number
 from ..model.model import Model
 from ..model.unsupported_elements import unsupported_elements
-from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, NOT_JUDGED, Equilibrium, Touch
+from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, Equilibrium, Touch
 from ..results.result import Result
+from ..results.wording import NOT_JUDGED
 from ..simulation.initial_state import choose_coordinates, find_initial_state
 from ..statics.closed_contacts import find_closed_contacts
 from ..statics.contact_equilibrium import REST_BALANCE, refuse_bulk_and_events, touch_states

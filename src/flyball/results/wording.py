@@ -19,6 +19,9 @@ INSTANT_KINDS = ("event", "impact", "kick", "jam", "rest", "turn", "hold", "leav
 
 NEGLIGIBLE = 1e-10  # relative to the size of its kind: smaller numbers are rounding or iteration errors
 
+STABLE, MARGINAL, UNSTABLE, NOT_JUDGED = "stable", "marginal", "unstable", "not judged"
+"""Stability of an equilibrium."""
+
 
 def without_rounding(values: Any, size: float | None = None) -> np.ndarray:
     """Return the values, with 0 for those negligible beside ``size`` (the largest of them, if not given)."""

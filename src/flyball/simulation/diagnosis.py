@@ -31,8 +31,8 @@ from ..model.force import CoordinateForce
 from ..model.messages import abbreviated
 from ..numerics.integrators import time_loop as ex
 from ..tables.table_definitions import REVOLUTE
+from .integration_intervals import sampling_limits_steps
 from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
-from .sampling_instants import sampling_limits_steps
 
 if TYPE_CHECKING:
     pass

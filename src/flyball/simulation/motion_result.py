@@ -39,9 +39,8 @@ from .diagnosis import (
 from .events.context import EventContext
 from .events.event_actions import continuation_data
 from .initial_state import InitialState, start_record
-from .integration_intervals import PAUSED_MESSAGE
+from .integration_intervals import PAUSED_MESSAGE, never_sampled
 from .integration_options import Integration
-from .sampling_instants import never_sampled
 
 
 def can_defer_accelerations(start: InitialState, o: Integration, task: int) -> bool:

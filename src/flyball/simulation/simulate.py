@@ -31,7 +31,14 @@ from .events.event_loop import integrate_events
 from .implicit.integrators import refuse_for_variational
 from .impulse_stepping.impulse_simulation import simulate_by_impulses
 from .initial_state import InitialState, find_initial_state, start_time
-from .integration_intervals import Segment, known_breaks, laws_checked_in_steps, remark_on_checked_laws, whole_motion
+from .integration_intervals import (
+    Segment,
+    known_breaks,
+    laws_checked_in_steps,
+    refuse_too_often,
+    remark_on_checked_laws,
+    whole_motion,
+)
 from .integration_options import STABILIZATION, Integration, Stepping, output_times, refuse_beyond_memory
 from .law_faults import refuse_out_of_table
 from .method_choice import (
@@ -49,7 +56,6 @@ from .method_choice import (
 )
 from .motion_result import can_defer_accelerations, make_result, solve_accelerations
 from .prescribed_motion import at_outputs, deferred_works, leaves_no_freedom, remark_friction
-from .sampling_instants import refuse_too_often
 from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, StiffnessMonitor
 
 # tolerances of the stages on the constraints, as parts of the tolerance of positions; and the largest, relative to the

@@ -20,16 +20,8 @@ from ..derivatives.output_derivatives import snapshot
 from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.contact import not_for_impulse_stepping
 from ..model.model import Model
-from ..results.equilibrium import (
-    ABOUT_TO_OPEN,
-    AT_FRICTION_LIMIT,
-    FRICTIONLESS,
-    MARGINAL,
-    NOT_JUDGED,
-    STICKS,
-    Equilibrium,
-    Touch,
-)
+from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, FRICTIONLESS, STICKS, Equilibrium, Touch
+from ..results.wording import MARGINAL, NOT_JUDGED
 from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
 from ..simulation.impulse_stepping.setup import (
     MechanismMotion,

@@ -26,8 +26,9 @@ from ..model.contact import has_switching_elements
 from ..model.element_laws import with_inputs
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_switching_with_controllers
-from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, STABLE, UNSTABLE, Equilibrium
+from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium
 from ..results.result import Result
+from ..results.wording import STABLE, UNSTABLE
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..simulation.initial_state import find_initial_state as begin_motion
 from ..tables.structure_definition import velocity_names

@@ -20,9 +20,9 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.model import Model, listing, suggest
 from ..model.unsupported_elements import refuse_unsupported
 from ..progress import progress_bar
-from ..results.equilibrium import UNSTABLE, Equilibrium
-from ..results.equilibrium_series import EquilibriumSeries, Jump
+from ..results.equilibrium import Equilibrium, EquilibriumSeries, Jump
 from ..results.result import Result
+from ..results.wording import UNSTABLE
 from ..tables.element_numbers import unused_parameters
 from .equilibrium import equilibrium as single
 from .equilibrium import rest_options

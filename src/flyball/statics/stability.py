@@ -40,8 +40,8 @@ from ..derivatives.reduced_equations import (
 from ..engine.kinematics import retract
 from ..errors import AnalysisError
 from ..numerics.rank import null_space
-from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE
 from ..results.modes import largest_growth
+from ..results.wording import MARGINAL, STABLE, UNSTABLE
 from ..tables.structure_definition import velocity_names
 
 CLOSED_GAP = 1e-12  # gap of rows of unit norm [rad, or relative to the mechanism's length] that counts as closed

@@ -27,8 +27,8 @@ from ..model.messages import listing, suggest
 from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..model.unsupported_elements import refuse_sampled_controllers, refuse_unsupported, unsupported_elements
-from ..results.equilibrium import NOT_JUDGED, STABLE
 from ..results.linear_model import LinearModel
+from ..results.wording import NOT_JUDGED, STABLE
 from ..simulation.method_choice import SimulateOptions
 from ..simulation.prescribed_motion import is_checked_afterwards
 from ..simulation.simulate import simulate

@@ -15,15 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..results.equilibrium import UNSTABLE
+from ..results.wording import UNSTABLE
 from .figures import UNIT_LABELS
 from .plotting import DASH_STYLES, LEGEND_BESIDE, PALETTE, axis_label, finish_figure, new_figure, plot_style, set_title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..results.equilibrium import Equilibrium
-    from ..results.equilibrium_series import EquilibriumSeries
+    from ..results.equilibrium import Equilibrium, EquilibriumSeries
     from ..results.sensitivity_and_optimum import Optimum, Sensitivity
     from ..results.study import Indices, Study
 

@@ -52,11 +52,10 @@ from ...results.phases import Phase, RecordedModes, event_energies, phases_or_no
 from ...results.result import Result
 from ...tables.table_definitions import assign
 from ..implicit.integrators import implicit_integrator
-from ..integration_intervals import IMPLICIT_STEP_WEIGHT, SegmentEnd, SmoothIntervals, known_breaks
+from ..integration_intervals import IMPLICIT_STEP_WEIGHT, SegmentEnd, SmoothIntervals, known_breaks, sampling
 from ..integration_options import Integration
 from ..method_choice import IMPLICIT_METHODS, explicit_substitute
 from ..motion_result import missing_accelerations
-from ..sampling_instants import sampling
 from ..solver_switching import (
     BECAUSE_JUMPED,
     BECAUSE_NOT_STIFF,
