@@ -226,6 +226,7 @@ _HOME = {
     "InverseDynamics": "results.inverse_dynamics",
     "LinearModel": "results.linear_model",
     "Modes": "results.modes",
+    "Fit": "results.sensitivity_and_optimum",
     "Optimum": "results.sensitivity_and_optimum",
     "RootLocus": "results.modes",
     "Sensitivity": "results.sensitivity_and_optimum",

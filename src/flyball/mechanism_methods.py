@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .results.mobility import Mobility
     from .results.modes import Modes, RootLocus
     from .results.result import Result
-    from .results.sensitivity_and_optimum import Optimum, Sensitivity
+    from .results.sensitivity_and_optimum import Fit, Optimum, Sensitivity
     from .results.singularities import Branch, Singularities
     from .results.study import Study
     from .simulation.integration_options import Stepping
@@ -1040,6 +1040,69 @@ class DesignMethods(Model):
         from .sensitivity.optimization import OptimizeOptions, optimize
 
         return optimize(self, OptimizeOptions.from_arguments(locals()))
+
+    def fit(
+        self,
+        data: str | PathLike | Mapping[str, Any],
+        to: Sequence[str] | Mapping[str, tuple[float | str | None, float | str | None]],
+        *,
+        noise: Mapping[str, float | str] | None = None,
+        confidence: float = 0.95,
+        parameters: Mapping[str, float | str] | None = None,
+        rtol: float | None = None,
+        atol: float | None = None,
+        coordinates: str = "auto",
+        evaluations: int = 200,
+        tolerance: float = 1e-10,
+        progress: bool | Callable[[float], None] = True,
+    ) -> Fit:
+        """Fit parameters to a measured motion by least squares, with confidence intervals.
+
+        Deviations of each curve are weighted by its noise: as given, or estimated from the residuals of a first fit.
+        Derivatives are exact, as in `sensitivity`. Intervals follow from the linearised model and Student's
+        distribution (Seber and Wild, Nonlinear Regression, 1989, section 5.1).
+
+        Parameters
+        ----------
+        data : str, path, or mapping of str to array
+            A table (.csv) with a heading line, or arrays by heading: times ``t [s]``, and measured curves such as
+            ``slider.x [mm]``; without a unit in SI. An empty entry or nan is a value that was not measured. The motion
+            starts at t = 0, or at the first time if that is earlier.
+        to : sequence of str, or mapping of str to (lowest, highest)
+            Parameters to be fitted, with their bounds (None: none).
+        noise : mapping of str to number, optional
+            Standard deviation of the measurements of every curve.
+        confidence : float
+            Probability that an interval contains the true value.
+        parameters : mapping, optional
+            Initial values, in place of the model's.
+        rtol : float [1], optional
+            As for `sensitivity`.
+        atol : float [1], optional
+            As for `sensitivity`.
+        coordinates : {"auto", "absolute", "joint"}
+            As for `sensitivity`.
+        evaluations : int
+            Largest number of analyses of each fit.
+        tolerance : float [1]
+            Relative changes of cost and parameters below which the search ends.
+        progress : bool or callable
+            As for `optimize`.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        ModelError
+            If a quantity or parameter does not exist, or the data are no table of numbers.
+        AnalysisError
+            If the data do not determine the parameters.
+        """
+        from .sensitivity.optimization import FitOptions, fit
+
+        return fit(self, FitOptions.from_arguments(locals()))
 
     def study(
         self,

@@ -31,6 +31,7 @@ METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.i
 COMMANDS = typer.main.get_command(app).commands
 NOT_COMMANDS = {
     "assemble",
+    "fit",
     "mass_properties",
     "prepare",
     "stepper",

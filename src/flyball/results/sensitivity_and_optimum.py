@@ -1,4 +1,4 @@
-"""Derivatives of quantities with respect to parameters, and parameters found by optimisation."""
+"""Derivatives with respect to parameters; parameters found by optimisation and by fits to measurements."""
 
 from __future__ import annotations
 
@@ -200,3 +200,57 @@ class Optimum:
 
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+
+@dataclass(kw_only=True, repr=False)
+class Fit(Optimum):
+    """Parameters that fit measurements best, with their confidence intervals.
+
+    Attributes
+    ----------
+    intervals : dict
+        Parameter -> lower and upper end of its confidence interval.
+    standard_errors : dict
+        Parameter -> standard deviation of its estimate.
+    covariance : ndarray (to, to)
+        Of the estimates, in the order of ``parameters``.
+    confidence : float
+        Probability that an interval contains the true value.
+    noise : dict
+        Quantity -> standard deviation of its measurements: as given, or estimated from the residuals.
+    """
+
+    intervals: dict[str, tuple[float, float]]
+    standard_errors: dict[str, float]
+    covariance: np.ndarray = field(repr=False)
+    confidence: float
+    noise: dict[str, float]
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Measured less computed values, (n, of); nan where nothing was measured."""
+        assert self.target is not None
+        return np.asarray(self.target - self.values)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """A table for people."""
+        out = super().lines()
+        percent = f"{100 * self.confidence:g} %"
+        for k, (name, (low, high)) in enumerate(self.intervals.items()):
+            at = next(i for i, (kind, text) in enumerate(out) if kind == "parameter" and text.startswith(f"{name}:"))
+            out[at] = "parameter", f"{out[at][1]}, {percent}: {low:.6g} to {high:.6g}"
+            others = self.covariance[k] / (np.sqrt(np.diag(self.covariance)) * self.standard_errors[name])
+            others[k] = 0.0
+            if (most := int(np.abs(others).argmax())) != k and abs(others[most]) > STRONG_CORRELATION:
+                out.append(("correlation", f"{name} and {list(self.intervals)[most]}: {others[most]:.3f}"))
+        units = dict(zip(self.of, self.units, strict=True))
+        return [*out, *(("noise", f"{name}: {x:.4g} {units[name]}") for name, x in self.noise.items())]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        own = {"intervals": {k: list(x) for k, x in self.intervals.items()}, "standard_errors": self.standard_errors}
+        own |= {"covariance": self.covariance.tolist(), "confidence": self.confidence, "noise": self.noise}
+        return super().as_dict() | own
+
+
+STRONG_CORRELATION = 0.9  # correlation of two estimates from which on it is printed

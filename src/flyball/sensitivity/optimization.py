@@ -1,21 +1,25 @@
-"""Optimisation of parameters with exact derivatives: fitting curves, tuning springs, synthesis of linkages."""
+"""Optimisation of parameters with exact derivatives: tuning, synthesis of linkages, fits to measurements."""
 
 from __future__ import annotations
 
+import csv
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis_options import name_list, require_positive
+from ..analysis_options import Options, name_list, require_positive
 from ..analysis_options import require_count as at_least
 from ..errors import AnalysisError, Interrupted, ModelError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
+from ..model.quantities import single_quantity
+from ..model.units import to_si
 from ..model.unsupported_elements import refuse_unsupported
 from ..progress import ReportProgress, progress_bar
-from ..results.sensitivity_and_optimum import Optimum
+from ..results.sensitivity_and_optimum import Fit, Optimum
 from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
 
 DIFFERENCE_STEP = 1e-6  # relative step of the quantities for the gradient of a user's function
@@ -344,3 +348,180 @@ def _difference_gradient(function: Callable[[np.ndarray], float], values: np.nda
             down[i] -= h * way
             out[i] += way * (function(up) - function(down)) / (2.0 * h)
     return out
+
+
+# Fits to measurements: nonlinear least squares with weights 1 / sigma of each curve. The covariance of the estimates is
+# s^2 (J^T J)^-1 with the weighted Jacobian J and the variance s^2 of the weighted residuals, 1 where sigma is known;
+# intervals are those of Student's distribution (Seber and Wild, Nonlinear Regression, 1989, sections 2.1 and 5.1).
+
+NOT_DETERMINED = 1e-7  # smallest singular value of the scaled Jacobian, relative to the largest: below it is rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions(Options):
+    """Arguments of `Mechanism.fit`."""
+
+    data: str | os.PathLike | Mapping[str, Any]
+    to: Sequence[str] | Bounds
+    noise: Mapping[str, float | str] | None
+    confidence: float
+    parameters: Mapping[str, float] | None
+    rtol: float | None
+    atol: float | None
+    coordinates: str
+    evaluations: int
+    tolerance: float
+    progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.confidence < 1.0:
+            raise ModelError(f"confidence is a probability between 0 and 1, such as 0.95, not {self.confidence!r}")
+
+    def optimization(self, m: Measurements, weights: np.ndarray, parameters: Mapping[str, float]) -> OptimizeOptions:
+        """Return the options of the least squares with these weights (n, of), from other values of the parameters."""
+        given = ("to", "rtol", "atol", "coordinates", "evaluations", "tolerance", "progress")
+        own = {k: getattr(self, k) for k in given}
+        first = min(0.0, float(m.t[0]))
+        return OptimizeOptions(
+            **own, of=m.names, target=np.where(m.known, m.values, 0.0), minimize=None, weights=weights,
+            analysis="motion", t=first, t_end=float(m.t[-1]), outputs=m.t.tolist(), about=None,
+            parameters={**(self.parameters or {}), **parameters},
+        )  # fmt: skip
+
+
+class Measurements(NamedTuple):
+    """Measured curves: names, times (n,), values (n, of) in SI units, and whether each was measured."""
+
+    names: tuple[str, ...]
+    t: np.ndarray
+    values: np.ndarray
+    known: np.ndarray
+
+
+def fit(model: Model, o: FitOptions) -> Fit:
+    """Fit parameters to measurements: see `Mechanism.fit`."""
+    refuse_unsupported(model, "fit", controlled=True)
+    m = _measurements(model, o.data)
+    given = _noise(model, m, o.noise)
+    ranges = np.nanmax(m.values, axis=0) - np.nanmin(m.values, axis=0)
+    sigma = np.array([given.get(name, 0.0) for name in m.names])
+    sigma = np.where(sigma > 0.0, sigma, np.where(ranges > 0.0, ranges, 1.0))
+    found = optimize(model, o.optimization(m, np.where(m.known, 1.0 / sigma, 0.0), {}))
+    if not given:  # again, with weights from the residuals
+        first, sigma = found, _noise_of_residuals(m, found, sigma, len(o.to))
+        found = optimize(model, o.optimization(m, np.where(m.known, 1.0 / sigma, 0.0), first.parameters))
+        found.start, found.start_values = first.start, first.start_values
+        begin = np.where(m.known, (first.start_values - m.values) / sigma, 0.0)
+        found.start_cost = 0.5 * float((begin**2).sum())
+        found.evaluations += first.evaluations
+        sigma = _noise_of_residuals(m, found, sigma, len(o.to))
+    J = sensitivity(model, o.optimization(m, np.ones(1), {}).sensitivity(found.parameters)).derivatives
+    return _with_intervals(o, m, found, J, sigma, bool(given))
+
+
+def _measurements(model: Model, data: Any) -> Measurements:
+    """Read measurements from a table in a file, or from arrays by name.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file or quantity, a unit does not fit, or times do not ascend.
+    """
+    columns = _columns_of_file(data) if isinstance(data, str | os.PathLike) else dict(data)
+    columns = {name.partition("[")[0].strip(): (name, x) for name, x in columns.items()}
+    time = next((columns.pop(k) for k in ("t", "time") if k in columns), None)
+    if time is None or not columns:
+        raise ModelError("the data need times, 't' or 'time', and at least one measured curve, such as 'slider.x [mm]'")
+    t = _in_si(time[0], time[1], "s")
+    if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
+        raise ModelError("the data need two or more finite times in ascending order")
+    values = []
+    for name, (heading, x) in columns.items():
+        v = _in_si(heading, x, single_quantity(model, name).unit)
+        if v.shape != t.shape:
+            raise ModelError(f"{name!r} has {v.size} values at {len(t)} times; leave gaps as nan")
+        if not np.isfinite(v).any():
+            raise ModelError(f"{name!r} has no finite value")
+        values.append(v)
+    table = np.stack(values, axis=1)
+    return Measurements(tuple(columns), t, table, np.isfinite(table))
+
+
+def _columns_of_file(path: str | os.PathLike) -> dict[str, Any]:
+    """Return the columns of a table with a heading line; empty entries are nan."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            head, *rows = [row for row in csv.reader(file) if row]
+        table = [[float(x) if x.strip() else np.nan for x in row] for row in rows]
+        return {name.strip(): [row[k] for row in table] for k, name in enumerate(head)}
+    except OSError as error:
+        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
+    except (ValueError, IndexError) as error:
+        raise ModelError(f"{os.fspath(path)!r} is no table of numbers with a heading line: {error}") from None
+
+
+def _in_si(heading: str, values: Any, unit: str) -> np.ndarray:
+    """Return a column in SI units; its own unit stands in brackets in its heading."""
+    name, bracket, own = heading.partition("[")
+    x = _number_array(values, name.strip())
+    return x * to_si(f"1 {own.rstrip('] ')}", unit or "1") if bracket else x
+
+
+def _noise(model: Model, m: Measurements, noise: Mapping[str, float | str] | None) -> dict[str, float]:
+    """Return given standard deviations in SI units: of all curves, or none."""
+    out = {}
+    for name, x in (noise or {}).items():
+        if name not in m.names:
+            raise ModelError(f"noise: {name!r} is not among the data{suggest(name, list(m.names))}")
+        out[name] = number(x, {}, single_quantity(model, name).unit, f"noise of {name!r}")
+        require_positive(out[name], f"noise of {name!r}")
+    if out and len(out) < len(m.names):
+        missing = next(name for name in m.names if name not in out)
+        raise ModelError(f"give the noise of every curve, also of {missing!r}, or of none")
+    return out
+
+
+def _noise_of_residuals(m: Measurements, found: Optimum, sigma: np.ndarray, parameters: int) -> np.ndarray:
+    """Estimate the standard deviation of each curve's noise; each curve has its share of the parameters."""
+    r = np.where(m.known, m.values - found.values, 0.0)
+    counts = m.known.sum(axis=0)
+    freedom = np.maximum(counts - parameters * counts / counts.sum(), 1.0)
+    estimate = np.sqrt((r**2).sum(axis=0) / freedom)
+    return np.where(estimate > 0.0, estimate, sigma)
+
+
+def _with_intervals(
+    o: FitOptions, m: Measurements, found: Optimum, derivatives: np.ndarray, sigma: np.ndarray, known: bool
+) -> Fit:
+    """Return the fit with the confidence intervals of its parameters."""
+    from scipy.stats import t as student
+
+    names = list(found.parameters)
+    J = (derivatives / sigma[:, None])[m.known]
+    r = ((m.values - found.values) / sigma)[m.known]
+    size = np.linalg.norm(J, axis=0)
+    freedom = len(r) - len(names)
+    if freedom <= 0:
+        raise AnalysisError(f"{len(r)} measured values do not determine {len(names)} parameters and their uncertainty")
+    _, s, V = np.linalg.svd(J / np.where(size > 0.0, size, 1.0), full_matrices=False)
+    if not size.all() or s[-1] <= NOT_DETERMINED * s[0]:
+        weak = [n for n, x in zip(names, np.abs(V[-1]), strict=True) if x > 0.5 * np.abs(V[-1]).max()]
+        raise AnalysisError(
+            f"the data do not determine {' and '.join(weak)}{' separately' if len(weak) > 1 else ''}: leave one out, "
+            "or measure a motion that depends on them in different ways"
+        )
+    variance = 1.0 if known else float(r @ r) / freedom
+    covariance = variance * (V.T / s**2) @ V / np.outer(size, size)
+    errors = np.sqrt(np.diag(covariance))
+    wide = float(student.ppf(0.5 + 0.5 * o.confidence, freedom)) * errors
+    best = np.array(list(found.parameters.values()))
+    kept = {f.name: getattr(found, f.name) for f in fields(found)} | {"target": np.where(m.known, m.values, np.nan)}
+    return Fit(
+        **kept,
+        intervals=dict(zip(names, zip((best - wide).tolist(), (best + wide).tolist(), strict=True), strict=True)),
+        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
+        covariance=covariance,
+        confidence=o.confidence,
+        noise=dict(zip(m.names, (sigma * np.sqrt(variance)).tolist(), strict=True)),
+    )
