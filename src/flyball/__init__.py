@@ -159,6 +159,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.study import Indices as Indices
     from .results.study import Study as Study
     from .simulation.integration_options import Stepping as Stepping
+    from .simulation.stepper import Stepper as Stepper
     from .studies.study import load_study as load_study
     from .symbolic.equations import Equations as Equations
     from .symbolic.explicit.explicit_equations import ExplicitEquations as ExplicitEquations

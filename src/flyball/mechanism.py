@@ -25,9 +25,19 @@ if TYPE_CHECKING:
 
 
 class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, SymbolicMethods, Model):
-    """A mechanism: one description, on which every analysis can be run. See `Model` for the elements it accepts.
+    """A mechanism: one description, to which elements are added, and on which every analysis can be run.
 
     No analysis stores its results in it, so parameter sweeps are plain loops.
+
+    Parameters
+    ----------
+    name : str
+    planar : bool
+        Whether everything moves in the x-y plane (three velocities a body) or in space (six).
+    gravity : vector [m/s^2]
+        Acceleration of gravity in world axes; none if not given.
+    parameters : dict
+        Named numbers, usable in every expression of the mechanism.
     """
 
     def save(self, path: str | os.PathLike) -> None:

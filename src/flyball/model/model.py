@@ -40,18 +40,7 @@ from .validation import check_kind, check_name, check_references, check_vectors,
 
 
 class Model:
-    """The description of a mechanism.
-
-    Parameters
-    ----------
-    name : str
-    planar : bool
-        Whether everything moves in the x-y plane (three velocities a body) or in space (six).
-    gravity : vector [m/s^2]
-        Acceleration of gravity in world axes; none if not given.
-    parameters : dict
-        Named numbers, usable in every expression of the mechanism.
-    """
+    """The description of a mechanism, without its analyses; `flyball.Mechanism` documents the arguments."""
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
     cache: ResultCache  # of a snapshot: cached results

@@ -1,0 +1,32 @@
+"""Hooks of MkDocs: pages made from the package and the examples, and links to examples that lead into the gallery."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "src")]
+import gallery
+import reference
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the generated pages."""
+    for path, text in (reference.pages() | gallery.pages()).items():
+        files.append(File.generated(config, path, content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Lead links to examples into the gallery, whose pages show their source."""
+    up = "../" * page.file.src_uri.count("/")
+    return re.sub(r"\]\((?:\.\./)+examples/(\w+)\.\w+\)", rf"]({up}gallery/\1.md)", markdown)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Leave out the dash before a description that is not there."""
+    return re.sub(r"\s*–\s*(?=</li>|<div class=\"doc-md-description\">\s*</div>)", "", html)
