@@ -20,9 +20,10 @@ OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
 class Snippet(NamedTuple):
-    """A fenced block: language, text, line of its first line."""
+    """A fenced block: language, what stands behind it, text, line of its first line."""
 
     language: str
+    options: str
     text: str
     line: int
 
@@ -35,8 +36,8 @@ def page(name: str) -> str:
 def snippets(path: Path) -> list[Snippet]:
     """Every fenced block of a page."""
     out, text = [], path.read_text(encoding="utf-8")
-    for m in re.finditer(r"^```(\w*)[^\n]*\n(.*?)^```$", text, flags=re.M | re.S):
-        out.append(Snippet(m[1], m[2], text[: m.start(2)].count("\n") + 1))
+    for m in re.finditer(r"^```(\w*)([^\n]*)\n(.*?)^```$", text, flags=re.M | re.S):
+        out.append(Snippet(m[1], m[2], m[3], text[: m.start(3)].count("\n") + 1))
     return out
 
 
@@ -44,7 +45,8 @@ def run_page(path: Path, folder: Path) -> int:
     """Run every snippet of a page in a folder with ``examples/``, and return how many.
 
     Python with ``>>>`` is a doctest. Other Python is executed; if the next block is text, it is what was printed. Lines
-    of a shell that begin with ``flyball`` are run, but for those with a placeholder in capitals. TOML is parsed.
+    of a shell that begin with ``flyball`` are run, but for those with a placeholder in capitals. TOML is parsed. A block
+    with a ``title`` is a file of that name.
     """
     shutil.copytree(ROOT / "examples", folder / "examples")
     names: dict[str, Any] = {"__name__": "__main__"}
@@ -52,6 +54,8 @@ def run_page(path: Path, folder: Path) -> int:
     with inside(folder):
         for k, s in enumerate(blocks):
             where = f"{path.name}, line {s.line}"
+            if title := re.search(r'title="([^"]+)"', s.options):
+                (folder / title[1]).write_text(s.text, encoding="utf-8")
             following = blocks[k + 1] if k + 1 < len(blocks) and blocks[k + 1].language == "text" else None
             if s.language == "python" and ">>>" in s.text:
                 _doctest(s, names, path.name)

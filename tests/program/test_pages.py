@@ -1,0 +1,36 @@
+"""Every snippet of README and docs runs as it stands, in order, and prints and writes what the page says."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import pytest
+
+from tests.pages import PAGES, ROOT, run_page, snippets
+
+RUN = [p for p in PAGES if any(s.language in ("python", "sh", "toml") for s in snippets(p))]
+NEEDS = {  # pages whose snippets need a package that flyball does not
+    "linear.md": ("sympy", "control"),
+    "symbolic.md": ("sympy",),
+    "explicit.md": ("sympy",),
+    "README.md": ("sympy",),
+}
+WRITTEN = re.compile(r'"([\w./-]+\.(?:png|svg|html|nc|csv|glb))"')
+
+
+def test_the_snippets_are_found():
+    assert len(RUN) >= 20
+    assert sum(len(snippets(p)) for p in RUN) >= 80
+
+
+@pytest.mark.parametrize("path", RUN, ids=lambda p: str(p.relative_to(ROOT)))
+def test_page(path, tmp_path, monkeypatch):
+    for package in NEEDS.get(path.name, ()):
+        pytest.importorskip(package)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert run_page(path, tmp_path) >= 1
+    python = re.sub(r"#.*", "", "".join(s.text for s in snippets(path) if s.language == "python"))
+    assert [name for name in WRITTEN.findall(python) if not (tmp_path / name).exists()] == []
