@@ -1,4 +1,4 @@
-"""Subcommands without an analysis: ``view`` opens a result in the web browser, ``compile`` compiles all kernels."""
+"""Subcommands without an analysis: ``view`` a result, write a ``new`` model file, ``compile`` all kernels."""
 
 from __future__ import annotations
 
@@ -54,6 +54,62 @@ def _page_file(file: Path) -> Path:
         page = Path(tempfile.mkdtemp(prefix="flyball-")) / page.name
         write_file(page, text)
     return page
+
+
+_PACKAGE = Path(__file__).parents[1]
+_FROM_EXAMPLES = {  # name for ``new``: file in examples/, in the wheel models/ (pyproject.toml)
+    "bouncing-ball": "bouncing_ball",
+    "cam": "cam_follower",
+    "geneva-drive": "geneva_drive",
+    "governor": "governor",
+    "quick-return": "quick_return",
+    "ratchet": "ratchet",
+    "slider-crank": "slider_crank",
+    "toggle-press": "toggle_press",
+    "wishbone": "double_wishbone",
+}
+
+
+def model_files() -> dict[str, Path]:
+    """Return the model file that ``new`` writes for each name."""
+    found = {p.stem: p for p in (_PACKAGE / "models").glob("*.toml")}
+    examples = _PACKAGE.parents[1] / "examples"  # of a checkout
+    found |= {k: examples / f"{v}.toml" for k, v in _FROM_EXAMPLES.items() if k not in found}
+    return dict(sorted(found.items()))
+
+
+def _shown(name: str, file: Path) -> str:
+    """Return a name with the first sentence of the file's comment."""
+    lines = file.read_text(encoding="utf-8").split("\nname =")[0].splitlines()
+    sentence = " ".join(line.removeprefix("#").strip() for line in lines).split(". ")[0].split(": ")[0].rstrip(".")
+    return f"{name:<16} {sentence}"
+
+
+@app.command(short_help="Write a commented model file to begin with.")
+def new(
+    name: Annotated[str | None, typer.Argument(help="A name of the list, such as four-bar.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="The file to write; NAME.toml if not given.")] = None,
+    list_names: Annotated[bool, typer.Option("--list", help="Print the names.")] = False,
+) -> None:
+    """Write a commented model file to begin with; without a name, list what there is."""
+    with report_errors(False):
+        known = model_files()
+        if list_names or name is None:
+            typer.echo("\n".join(_shown(k, v) for k, v in known.items()))
+            return
+        from ..model.messages import suggest
+        from ..model.output_files import DESCRIPTION, file_extension, write_file
+
+        if name not in known:
+            raise ModelError(f"there is no model file {name!r} to begin with{suggest(name, known)}; flyball new --list")
+        target = file or Path(f"{name}.toml")
+        file_extension(target, DESCRIPTION)
+        if target.exists():
+            raise ModelError(f"{str(target)!r} exists and is not replaced; give another file: flyball new {name} FILE")
+        source = known[name]
+        text = source.read_text(encoding="utf-8").replace(f"examples/{source.name}", str(target))
+        write_file(target, text.replace(f" {source.name}", f" {target}"))
+        typer.echo(f"{target} is written: flyball run {target}")
 
 
 @app.command(name="compile", short_help="Compile everything that would be compiled on first use.")
