@@ -80,7 +80,7 @@ def test_the_quarter_car_rests_until_the_bump(written):
     m = written("suspension")
     run = m.simulate(3, outputs=301)
     assert np.abs(run["body.y"] - 0.8)[run.t < 0.45].max() < 1e-9
-    assert 0.01 < np.abs(run["body.y"] - 0.8).max() < 0.05
+    assert 0.04 < np.abs(run["body.y"] - 0.8).max() < 0.07  # the bump is 40 mm high
     # closed form of the two masses on springs in series, without damping
     k, kt, M, m_w = 20e3, 180e3, 300.0, 40.0
     want = np.sqrt(np.linalg.eigvals(np.array([[k / M, -k / M], [-k / m_w, (k + kt) / m_w]])).real)

@@ -33,4 +33,8 @@ def test_page(path, tmp_path, monkeypatch):
         warnings.simplefilter("ignore")
         assert run_page(path, tmp_path) >= 1
     python = re.sub(r"#.*", "", "".join(s.text for s in snippets(path) if s.language == "python"))
+    if path.parent.name == "tutorials":  # site-src/tutorial_pictures.py copies them
+        shown = re.findall(r"!\[[^\]]+\]\(images/([\w.]+)\)", path.read_text(encoding="utf-8"))
+        assert set(shown) <= {p.name for p in tmp_path.iterdir()}
+        assert shown or path.name == "index.md"
     assert [name for name in WRITTEN.findall(python) if not (tmp_path / name).exists()] == []
