@@ -10,6 +10,8 @@ import inspect
 from collections.abc import Iterator
 from typing import Any
 
+from uses import SIGNS, USES
+
 import flyball as fb
 from flyball.mechanism_methods import DesignMethods, MobilityMethods, MotionMethods, StaticsMethods, SymbolicMethods
 
@@ -128,6 +130,12 @@ def _entry(value: Any, level: int = 2, name: str = "", **options: Any) -> str:
     return f"{anchor}::: {path}\n    options:\n        heading_level: {level}\n{said}"
 
 
+def _use(name: str) -> str:
+    """Return a line of use, and signs, to stand below an entry."""
+    signs = f"\n**Signs.** {SIGNS[name]}\n" if name in SIGNS else ""
+    return f"{signs}\n```python\n{USES[name]}\n```\n" if name in USES else ""
+
+
 def _methods() -> Iterator[tuple[type, str]]:
     for family in _FAMILIES:
         yield from ((family, name) for name in vars(family) if not name.startswith("_"))
@@ -179,7 +187,7 @@ def pages() -> dict[str, str]:
             )
             for name in names[page]:
                 more = {"members": _OF_MECHANISM, "inherited_members": True} if name == "Mechanism" else listed
-                parts.append(_entry(getattr(fb, name), name=name, **more))
+                parts.append(_entry(getattr(fb, name), name=name, **more) + _use(name))
         out[f"reference/{page}.md"] = "\n".join(parts)
         rows = "".join(f"| [`{k}`]({page}.md#flyball.{k}) | {_first_line(getattr(fb, k))} |\n" for k in names[page])
         if page == "analyses":
