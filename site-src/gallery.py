@@ -8,16 +8,13 @@ import re
 import warnings
 from pathlib import Path
 
-from flyball import load
+from flyball import Body, Mechanism, load
 from flyball.view.animation import record_motion
 from flyball.view.reference_picture import reference_result
 from flyball.view.still_picture import still_svg
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-_PHOTOS = {
-    "pile_in_a_box": "pile.png",
-    "governor": "governor.png",
-}  # of docs/images
+_PHOTOS = {"pile_in_a_box": "pile.png"}  # of docs/images: its box hides what lies in it
 
 
 def _description(path: Path, text: str) -> str:
@@ -25,7 +22,7 @@ def _description(path: Path, text: str) -> str:
     if path.suffix == ".py":
         return ast.get_docstring(ast.parse(text)) or ""
     if path.suffix == ".ipynb":
-        return "".join(json.loads(text)["cells"][0]["source"]).removeprefix("# ")
+        return "".join(json.loads(text)["cells"][0]["source"]).partition("\n\n")[2]  # without its title
     lines = []
     for line in text.splitlines():
         if not line.startswith("#"):
@@ -46,15 +43,27 @@ def _code(path: Path, text: str) -> str:
     return f"```{kind}\n{text}\n```\n"
 
 
+def _without_sets(m: Mechanism) -> Mechanism:
+    """Return a mechanism with a body for each member of a set of bodies: line drawings show bodies only."""
+    out = m.changed({s.name: None for s in m.bulk})
+    for s in m.bulk:
+        for k, position in enumerate(s.position):
+            turn = (
+                {} if s.orientation is None else {"orientation": tuple(s.orientation[min(k, len(s.orientation) - 1)])}
+            )
+            out.add(
+                Body(f"{s.name} {k}", shape=s.shape, density=s.density, position=tuple(position), color=s.color, **turn)
+            )
+    return out
+
+
 def picture(path: Path) -> str:
     """Return a line drawing of the reference configuration as SVG, empty if there is none. Nothing is compiled."""
     if path.suffix == ".ipynb":
         return ""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        m = load(path)
-        if not m.body:
-            return ""
+        m = _without_sets(load(path))
         return still_svg(record_motion(reference_result(m), curves=False, with_notes=False))
 
 
