@@ -24,6 +24,7 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Lead links to examples into the gallery, whose pages show their source."""
     up = "../" * page.file.src_uri.count("/")
+    markdown = re.sub(r"\[([^]]+)\]\((?:\.\./)+examples/\w+\.(?:urdf|xml)\)", r"\1", markdown)  # no page of the gallery
     return re.sub(r"\]\((?:\.\./)+examples/(\w+)\.\w+\)", rf"]({up}gallery/\1.md)", markdown)
 
 

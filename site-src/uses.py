@@ -75,6 +75,8 @@ USES = {
     "MaterialPair": 'fb.MaterialPair("rubber", "steel", friction=0.7)',
     "Stepping": 'm.simulate(2, method=fb.Stepping(step="1 ms"))',
     # controllers
+    "ComputedTorque": 'fb.ComputedTorque("ct", coordinates=["A.angle"], reference=["sin(t)"], kp=100, kd=20)',
+    "GravityCompensatedPD": 'fb.GravityCompensatedPD("pd", coordinates=["A.angle"], reference=["1"], kp=50, kd=10)',
     "Integrator": 'fb.Integrator("sum", of="0.2 - slide.displacement", gain=2)',
     "Lag": 'fb.Lag("valve", of="command", time="20 ms")',
     "PID": 'fb.PID("pid", setpoint="0.2", measured="slide.displacement", kp=80, ki=60, kd=12, filter="20 ms")',

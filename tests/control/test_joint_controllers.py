@@ -12,7 +12,6 @@ from scipy.optimize import fsolve
 
 import flyball as fb
 from tests.control.robots import ARM, CRANE, arm, crane, decay, driven
-from tests.pages import assert_examples_run
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 KP, KD = (100.0, 64.0), (20.5, 12.0)
@@ -202,7 +201,3 @@ def test_a_coordinate_that_follows_from_another_is_refused():
     m.add(c)
     with pytest.raises(fb.ModelError, match=r"pd'.*(S.displacement follows from|adds constraint equations)"):
         driven(m, c).simulate(0.1)
-
-
-def test_examples_of_the_page_run():
-    assert_examples_run("controllers.md", 14)
