@@ -9,16 +9,16 @@ from typing import Any
 
 import griffe
 
-TYPE_AND_UNIT = re.compile(r"^(\s*[\w*, ]+ : [^\n\[]*) \[", flags=re.M)  # of a field in a NumPy docstring: number [m]
+TYPE_AND_UNIT = re.compile(r"^(\s*[\w*, ]+ : [^\n\[(]*) ([\[(])", flags=re.M)  # of a field: number [m], ndarray (n,)
 
 
 class ElementSignatures(griffe.Extension):
     """Give every class with the decorator ``element`` the signature that Python sees."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Keep a unit from being read as a subscript: a no-break space makes the type plain text."""
+        """Keep a unit from being read as a subscript, a shape as a call: a no-break space makes them plain text."""
         if obj.docstring:
-            obj.docstring.value = TYPE_AND_UNIT.sub("\\1\u00a0[", obj.docstring.value)
+            obj.docstring.value = TYPE_AND_UNIT.sub("\\1\u00a0\\2", obj.docstring.value)
 
     def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
         """Read the signature of the imported class."""

@@ -22,7 +22,7 @@ PAGES = {  # name of the page: title, introduction
     ),
     "analyses": (
         "Analyses",
-        "Methods of [`Mechanism`](mechanism.md). Each has a subcommand of `flyball` with the same options.",
+        "Methods of [`Mechanism`](mechanism.md). Most have a subcommand of `flyball` with the same options.",
     ),
     "bodies": (
         "Bodies, frames, drivers, sensors",
@@ -165,8 +165,8 @@ def _modules() -> Iterator[str]:
             yield f"Types of fields and constants: {', '.join(plain)}.\n"
         for v in documented.values():
             if inspect.isclass(v) or inspect.isfunction(v):
-                members = module is fb.elements and inspect.isclass(v)
-                yield _entry(v, 3, members=members)
+                options = {} if module is fb.elements and inspect.isclass(v) else {"members": False}
+                yield _entry(v, 3, **options)
 
 
 def pages() -> dict[str, str]:
@@ -186,7 +186,9 @@ def pages() -> dict[str, str]:
                 {"inherited_members": True, "merge_init_into_class": False} if page in _MEMBERS else {"members": False}
             )
             for name in names[page]:
-                more = {"members": _OF_MECHANISM, "inherited_members": True} if name == "Mechanism" else listed
+                more = {"members": _OF_MECHANISM, "inherited_members": True} if name == "Mechanism" else dict(listed)
+                if page == "errors":
+                    more["show_bases"] = True
                 parts.append(_entry(getattr(fb, name), name=name, **more) + _use(name))
         out[f"reference/{page}.md"] = "\n".join(parts)
         rows = "".join(f"| [`{k}`]({page}.md#flyball.{k}) | {_first_line(getattr(fb, k))} |\n" for k in names[page])
