@@ -19,6 +19,7 @@ from .mechanism_methods import (
     on_one_thread,
 )
 from .model.model import Model
+from .model.output_files import DESCRIPTION, ROBOT, file_extension
 
 if TYPE_CHECKING:
     from .results.result import Result
@@ -47,11 +48,12 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
         with their stops, damping and friction. One that ends in ``.xml`` or ``.mjcf`` gets a model of MuJoCo, with
         closed loops too. What a format does not have is listed in a `ModelWarning`, or refused.
         """
-        if str(path).lower().endswith((".xml", ".mjcf")):
+        ending = file_extension(path, (*DESCRIPTION, *ROBOT))
+        if ending in (".xml", ".mjcf"):
             from .robots.mjcf_writer import save_mjcf
 
             return save_mjcf(self, Path(path))
-        if str(path).lower().endswith(".urdf"):
+        if ending == ".urdf":
             from .robots.urdf_writer import save_urdf
 
             return save_urdf(self, Path(path))

@@ -396,7 +396,7 @@ class MotionMethods(Model):
         inputs: Sequence[str] = (),
         outputs: Sequence[str] = (),
         method: str | Stepping = "auto",
-        rtol: float = 1e-6,
+        rtol: float | None = None,
         step: float | str | None = None,
         coordinates: str = "auto",
         parameters: Mapping[str, float | str] | None = None,
@@ -419,8 +419,8 @@ class MotionMethods(Model):
         method : str or Stepping
             ``"auto"``: impulse time stepping if there are contacts, stops, friction or ropes, else an integrator. An
             explicit integrator by name; ``"impulse"``, or a `Stepping` with its options.
-        rtol : float
-            Relative tolerance of the integrator.
+        rtol : float [1], optional
+            Relative tolerance of the integrator, by default 1e-6.
         step : float or str [s], optional
             Fixed step of the integrator; by default it adapts to ``rtol``.
         coordinates : {"auto", "absolute", "joint"}

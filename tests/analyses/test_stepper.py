@@ -207,8 +207,10 @@ def test_states_are_those_of_prepare():
         (lambda: cart_pole("M", M=1.0).changed({"cart": fb.Body("cart", mass="M", inertia=0.1)}), {"inputs": ["M"]},
          "'M' cannot be an input.*'cart'"),
         (scene, {"method": "dop853"}, "method='dop853' does not support Contact 'touch'"),
-        (scene, {"step": 0.001}, "does not take step="),
-        (scene, {"coordinates": "joint"}, "does not take coordinates='joint'"),
+        (scene, {"step": 0.001}, "takes its step as method=fb.Stepping"),
+        (scene, {"rtol": 1e-3}, "rtol has no effect"),
+        (cart_pole, {"threads": 2}, "threads divide copies"),
+        (scene, {"coordinates": "joint"}, "uses absolute coordinates; leave coordinates='joint' out"),
     ],
 )  # fmt: skip
 def test_refusals_name_what_is_wrong(make, options, message):
@@ -253,3 +255,102 @@ def test_a_motion_that_cannot_continue_says_why():
     sim = m.stepper(0.05)
     with pytest.raises(fb.SimulationError, match="cart and pole"):
         sim.step(steps=100)
+
+
+SPINNING = {
+    "planar": (True, ["A.angle", "b.angle"]),
+    "spatial": (False, ["A.angle", "b.yaw"]),
+}
+
+
+@pytest.mark.parametrize("name", SPINNING)
+@pytest.mark.parametrize("method", ["joint", "absolute", "impulse", "driven"])
+def test_outputs_count_whole_turns(name, method):
+    """Angles of joints and bodies at many turns a step, from a start of several turns, whatever else reads them."""
+    planar, outputs = SPINNING[name]
+    inertia = 0.1 if planar else (0.1, 0.1, 0.1)
+    axis = {} if planar else {"axis": (0, 0, 1)}
+    m = fb.Mechanism("wheel", planar=planar)
+    m.add(fb.Body("b", mass=1, inertia=inertia), fb.Revolute("A", "ground", "b", at=(0,) * (2 + (not planar)), **axis))
+    if method == "driven":
+        m.add(fb.Driver("d", "A.angle", "20 + 300*t"))
+    options = {"method": "impulse"} if method == "impulse" else {"coordinates": method} if method != "driven" else {}
+    sim = m.stepper(0.05, outputs=outputs, t_start=1.0 if method != "driven" else 0.0, **options)
+    start = 20.0
+    if method != "driven":
+        sim.reset({"A.angle": (20.0, 300.0)})
+    assert sim.outputs()[0] == pytest.approx(start)
+    assert np.unwrap([0.0, sim.outputs()[1] - start])[1] == pytest.approx(0.0, abs=1e-9)  # the same but for turns
+    y = np.array([sim.outputs(), *(sim.step() for _ in range(10))])
+    slow = 0.99 if method == "impulse" and not planar else 1.0  # steps of 1.5 rad of a joint in space
+    assert y[-1, 0] - y[0, 0] == pytest.approx(150.0, rel=1.001 - slow + 1e-5)
+    assert y[-1, 1] - y[0, 1] == pytest.approx(y[-1, 0] - y[0, 0], abs=1e-6)
+    saved = sim.state
+    later = sim.step()
+    sim.state = saved
+    assert np.array_equal(sim.step(), later)
+
+
+def test_reset_of_described_values_and_quantities():
+    m = cart_pole()
+    m.add(fb.Initial("pin.angle", value=0.2, rate=1.0))
+    sim = m.stepper(0.02, outputs=NAMES)
+    assert sim.reset({"pin.angle": "30 deg"})[2] == pytest.approx(np.pi / 6)
+    assert sim.reset({"pin.angle": (0.5, "2 rad/s"), "rail.displacement": (None, 1.0)})[1:4] == pytest.approx(
+        [1, 0.5, 2]
+    )
+    assert sim.reset()[2:4] == pytest.approx([0.2, 1.0])
+    for values, message in (
+        ([1], "mapping"),
+        ({"pin.angle": "x"}, "'x'"),
+        ({"pin.angle": "1 kg"}, "kg"),
+        ({"pin.angle": (None, None)}, "to a value, or to value and rate"),
+        ({"pin.angle": (1, 2, 3)}, "to a value, or to value and rate"),
+        ({"nail.angle": 1}, "nail"),
+    ):
+        with pytest.raises(fb.ModelError, match=message):
+            sim.reset(values)
+
+
+def test_states_belong_to_their_stepper():
+    a, b = (cart_pole().stepper(0.02, outputs=NAMES) for _ in range(2))
+    with pytest.raises(fb.ModelError, match="one that this stepper gave"):
+        b.state = a.state
+
+
+@pytest.mark.parametrize("what", ["gravity", "shape", "initial", "nothing", "formula"])
+def test_inputs_that_would_do_nothing_are_refused(what):
+    gravity = (0, "-9.81*x") if what == "gravity" else (0, -9.81)
+    m = fb.Mechanism(
+        "p", planar=True, gravity=gravity, parameters={"x": 1.0} | ({"y": "2*x"} if what == "formula" else {})
+    )
+    shape = fb.Box(edges=("0.2*x", 0.1, 0.1)) if what == "shape" else None
+    own = {"shape": shape, "density": 1000} if shape else {"mass": 1, "inertia": 0.02}
+    m.add(fb.Body("b", position=(0.3, 0), **own), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    if what == "initial":
+        m.add(fb.Initial("A.angle", value="x"))
+    if what == "formula":
+        m.add(fb.Motor("motor", "A", torque="y"))
+    message = {
+        "nothing": "no law reads it",
+        "initial": "an initial value",
+        "formula": "the parameter 'y' depends on it",
+    }
+    with pytest.raises(fb.ModelError, match=f"'x' cannot be an input of a stepper: .*{message.get(what, '')}"):
+        m.stepper(0.01, inputs=["x"])
+
+
+def test_time_stays_where_a_step_failed():
+    sim = cart_pole("1/(0.01 - value)").stepper(0.05)
+    for _ in range(3):
+        with pytest.raises(fb.SimulationError):
+            sim.step(steps=100)
+        assert sim.t == 0.0
+    assert sim.reset().shape == (0,)
+
+
+def test_bad_inputs_are_refused():
+    sim = cart_pole().stepper(0.02, inputs=["push"])
+    for u in (["a"], {"push": 1}, [1j]):
+        with pytest.raises(fb.ModelError, match="numbers in SI units"):
+            sim.step(u)

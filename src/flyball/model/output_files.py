@@ -14,6 +14,7 @@ from ..errors import ModelError, cannot_write
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
 PICTURE, DESCRIPTION, SCENE = (".png", ".svg", ".pdf"), (".toml",), (".glb",)
 VIDEO = (".gif", ".mp4", ".webm")
+ROBOT = (".urdf", ".xml", ".mjcf")
 OTHER_METHODS = {
     SCENE: "save",
     VIDEO: "save",

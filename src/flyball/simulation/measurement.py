@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..assembly.assembled_state import initial_conditions
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..engine.entry_point import POSITION
 from ..errors import ModelError
 from ..model.body import GROUND, Driver, Frame
 from ..model.controller import Sensor
 from ..model.element_laws import with_inputs
+from ..model.expressions import parameter_formulas
 from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..numerics.integrators.butcher_tableaux import tableau
@@ -48,26 +50,50 @@ def model_with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[s
 
 
 def _refuse_numbers(model: Model, name: str, parameter: str) -> None:
-    """Refuse a parameter that numbers of elements depend on."""
+    """Refuse a parameter that no law reads, or that anything but a law depends on."""
     value = float(model.environment({})[parameter])
-    numbers = element_numbers(model)
+    other = {parameter: CHANGED_INPUT * value if value else 1.0}
+    refusal = f"{name!r} cannot be an input of a stepper: "
+    dependent = [k for k, formula in parameter_formulas(model.parameters).items() if parameter in formula.names]
+    if dependent:
+        raise ModelError(f"{refusal}the parameter {dependent[0]!r} depends on it; write laws with {name!r} itself")
     try:
-        changed = element_numbers(model, {parameter: CHANGED_INPUT * value if value else 1.0})
+        what = _dependent_number(model, other)
     except ModelError as error:  # the other value is invalid: some number depends on it
+        raise ModelError(f"{refusal}it sets numbers of elements: {error}") from None
+    if what:
         raise ModelError(
-            f"{name!r} cannot be an input of a stepper, since it sets numbers of elements: {error}"
-        ) from None
-    found = [k for k, x in numbers.of.items() if not _equal(vars(x), vars(changed.of[k]))]
-    if found:
-        raise ModelError(
-            f"{name!r} cannot be an input of a stepper: {model[found[0]].title} depends on it by a number (a mass, a "
-            "length, a stiffness), and inputs are read by laws only. Give a force or motor as input, or write the law "
-            "with a parameter of its own"
+            f"{refusal}{what} depends on it by a number (a mass, a length, a stiffness), and inputs are read by laws "
+            "only. Give a force or motor as input, or write the law with a parameter of its own"
         )
+    if not any(parameter in law.names for _, law, _ in element_laws(model)):
+        raise ModelError(f"{refusal}no law reads it")
+
+
+def _dependent_number(model: Model, other: Mapping[str, float]) -> str:
+    """Return what has other numbers with other values of parameters, besides laws; empty if there is nothing."""
+    before, after = element_numbers(model), element_numbers(model, other)
+    if not np.array_equal(model.gravity_vector(before.env), model.gravity_vector(after.env)):
+        return "gravity"
+    for found, changed in ((before.of, after.of), (before.bodies, after.bodies)):
+        for k, x in found.items():
+            if not _equal(vars(x), vars(changed[k])):
+                return str(model[k].title)
+    if initial_conditions(model, before.env) != initial_conditions(model, after.env):
+        return "an initial value"
+    return ""
 
 
 def _equal(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     return all(repr(x) == repr(b[k]) for k, x in a.items())
+
+
+class CountedAngles(NamedTuple):
+    """Angles whose whole turns are counted, each (n,)."""
+
+    state: np.ndarray  # entries of the state
+    rate: np.ndarray  # entries of the measured values
+    factor: np.ndarray  # rate of the state by the measured rate
 
 
 class Measurement:
@@ -102,6 +128,7 @@ class Measurement:
         tree: Sequence[str],
         parameters: Mapping[str, float] | None,
     ) -> None:
+        self._described = model
         model, names = _with_sensors(model, outputs)
         c = self._compiled = compile_mechanism(model, parameters=parameters, tree=tree, outputs=names, solved=False)
         s = self.structure = c.structure
@@ -117,17 +144,54 @@ class Measurement:
         self._columns = np.array([s.slots[name] for name in names], np.int64)
         self._values, self._records = c.work.sensed.value, c.work.BK
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
+        self._turns = self._counted_angles(())
 
-    def common_states(self, other: Structure) -> list[tuple[int, int]]:
-        """Return the entries of controller states, angles and places in the state of another structure, and in this."""
-        first, here = other.nq + other.nv, self.structure.nq + self.structure.nv
-        own = self.structure.state_at
-        return [(first + k, here + own[name]) for name, k in other.state_at.items() if name in own]
+    def _counted_angles(self, known: Collection[int]) -> CountedAngles:
+        """Return the angles whose whole turns are counted here: all but those at some entries of the state."""
+        s, first, nm = self.structure, self.structure.nq + self.structure.nv, len(self.structure.measured)
+        angles = [t for t in s.terms if t.measured and t.hint >= 0 and t.formula.of_kind.turns]
+        terms = [t for t in angles if first + t.hint not in known]
+        return CountedAngles(
+            np.array([first + t.hint for t in terms], np.int64),
+            np.array([nm + t.row - len(s.rows) for t in terms], np.int64),
+            np.array([1.0 / t.sign for t in terms]),
+        )
+
+    def start(self, t: float, hints: Mapping[str, float], other: Structure) -> list[tuple[int, int]]:
+        """Take over time and angles with their whole turns at the start of a motion with another structure.
+
+        Returns the entries of controller states, angles and places in the state of that structure, and in this; the
+        motion counts these angles itself.
+        """
+        self._time.t = t
+        first = self.structure.nq + self.structure.nv
+        for name, k in self.structure.state_at.items():
+            if name in hints:
+                self.state[first + k] = hints[name]
+        there, own = other.nq + other.nv, self.structure.state_at
+        pairs = [(there + k, first + own[name]) for name, k in other.state_at.items() if name in own]
+        self._turns = self._counted_angles([k for _, k in pairs])
+        return pairs
 
     def update(self, t: float) -> None:
-        """Evaluate at time t and the state."""
+        """Evaluate at time t and the state; angles change by their mean rate since the last time, to a whole turn."""
+        turns, since = self._turns, t - float(self._time.t)
         self._time.t = t
+        if not len(turns.state):
+            self._evaluate(POSITION)
+            return
+        before, rate = self.state[turns.state], self._values[turns.rate]
         self._evaluate(POSITION)
+        self.state[turns.state] = before + 0.5 * since * turns.factor * (rate + self._values[turns.rate])
+        self._evaluate(POSITION)
+
+    def save(self) -> tuple[float, np.ndarray]:
+        """Return copies of time and state."""
+        return float(self._time.t), self.state.copy()
+
+    def restore(self, saved: tuple[float, np.ndarray]) -> None:
+        """Return to a saved time and state."""
+        self._time.t, self.state[:] = saved
 
     def outputs(self, out: np.ndarray) -> None:
         """Write the outputs at the state last evaluated."""
@@ -157,7 +221,7 @@ class Measurement:
     def _frame(self, name: str) -> tuple[int, np.ndarray, np.ndarray]:
         """Return the body's row, and the frame's position and rotation on it."""
         if name not in self._frames:
-            values, e = self._compiled.values, self.structure.model[name]
+            values, e = self._compiled.values, self._described[name]
             if name != GROUND and e.category not in ("bodies", "frames"):
                 raise ModelError(f"{e.title} has no pose; name a body or a frame")
             p, R = values.poses.named(name)

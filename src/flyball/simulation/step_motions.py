@@ -129,7 +129,10 @@ class IntegratedMotion:
     def measure_by(self, x: Measurement) -> None:
         """Prepare for `write_state`."""
         n = self.structure.nq + self.structure.nv
-        self._from, self._to = np.array([*((k, k) for k in range(n)), *x.common_states(self.structure)], np.int64).T
+        c = self.start.assembly.compiled
+        hints = self.start.base.compiled.hints | c.hints | c.turned(self.start.assembly.q)
+        pairs = x.start(float(self.clock.real.t), hints, self.structure)
+        self._from, self._to = np.array([*((k, k) for k in range(n)), *pairs], np.int64).T
 
     def write_state(self, x: Measurement) -> None:
         """Write the state to the measurement."""
@@ -186,7 +189,7 @@ class ImpulseMotion:
         base, scene, self.stepper, self.held, self.chosen = begin_by_impulses(model, t, o, parameters)
         self.stepper.state.times.now = t
         self.structure = base.compiled.structure
-        self._reference = base.q.copy()
+        self._reference, self._hints = base.q.copy(), base.compiled.hints
         first = {k: scene.carriers.slices[k].start for k in self.structure.place if k in scene.carriers.slices}
         tree, free = self.structure.tables["tree"], len(self.stepper.free.turn)
         rows = [(k, b) for name, b in self.structure.place.items() if b >= 0 and (k := first.get(name, free)) < free]
@@ -210,11 +213,13 @@ class ImpulseMotion:
 
     def measure_by(self, x: Measurement) -> None:
         """Find where the state of the jointed mechanism is in that of the whole."""
+        now = float(self.stepper.state.times.now)
         self._from = self._to = np.zeros(0, np.int64)
         if not self.held:
+            x.start(now, self._hints, self.structure)
             return
         s, whole = self.held.start.assembly.compiled.structure, self.structure
-        here, there, pairs = s.tables["tree"], whole.tables["tree"], x.common_states(s)
+        here, there, pairs = s.tables["tree"], whole.tables["tree"], x.start(now, self._hints, s)
         for name, b in s.place.items():
             if b >= 0:
                 k = whole.place[name]

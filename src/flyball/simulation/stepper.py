@@ -13,6 +13,7 @@ import numpy as np
 from ..analysis_options import Options, require_count, require_positive, seconds
 from ..errors import ModelError
 from ..model.body import Initial
+from ..model.expressions import number
 from ..model.model import Model
 from ..model.unsupported_elements import unsupported_elements
 from ..tables.structure_definition import velocity_names
@@ -22,6 +23,7 @@ from .measurement import Measurement, model_with_inputs
 from .method_choice import AUTO_METHOD, IMPULSE_METHOD, IMPULSE_STEPPING, unknown_to_impulse_stepping
 from .step_motions import ImpulseMotion, IntegratedMotion, StepMotion
 
+DEFAULT_RTOL = 1e-6
 MOST_STEPS = 100_000  # integration steps within one step of the stepper
 
 
@@ -33,7 +35,7 @@ class StepperOptions(Options):
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     method: str | Stepping
-    rtol: float
+    rtol: float | None
     step: float | None
     coordinates: str
     parameters: Mapping[str, float] | None
@@ -50,10 +52,12 @@ class StepperOptions(Options):
         require_count(self.threads, "threads")
         if self.copies is not None:
             require_count(self.copies, "copies")
+        elif self.threads != 1:
+            raise ModelError("threads divide copies; give their number, copies=, or leave threads out")
 
     def integration(self) -> Integration:
         """Return the options of an integration; they are checked."""
-        usual = default_integration(self.coordinates, self.rtol, None, MOST_STEPS)  # type: ignore[arg-type]
+        usual = default_integration(self.coordinates, self.rtol or DEFAULT_RTOL, None, MOST_STEPS)  # type: ignore[arg-type]
         method = usual.method if self.method == AUTO_METHOD else self.method
         return Integration(**{**usual.choices(), "method": method, "step": self.step})
 
@@ -69,20 +73,21 @@ class _Copy:
     def __post_init__(self) -> None:
         self.start = self.save()
 
-    def save(self) -> tuple[int, Any, np.ndarray]:
-        return self.count, self.motion.save(), self.measurement.state.copy()
+    def save(self) -> tuple[int, Any, Any]:
+        return self.count, self.motion.save(), self.measurement.save()
 
-    def restore(self, saved: tuple[int, Any, np.ndarray]) -> None:
+    def restore(self, saved: tuple[int, Any, Any]) -> None:
         self.count = saved[0]
         self.motion.restore(saved[1])
-        self.measurement.state[:] = saved[2]
+        self.measurement.restore(saved[2])
 
 
 @dataclass(frozen=True)
 class StepperState:
     """A state of a `Stepper`, to which it can return. Its contents are the stepper's own affair."""
 
-    copies: tuple[tuple[_Copy, tuple[int, Any, np.ndarray]], ...]
+    owner: object
+    copies: tuple[tuple[_Copy, tuple[int, Any, Any]], ...]
     inputs: np.ndarray
 
 
@@ -144,8 +149,8 @@ class Stepper:
         x.measurement.update(self._time(x))
         x.measurement.outputs(self._outputs[k])
 
-    def _time(self, x: _Copy) -> float:
-        return self._options.t_start + x.count * self.dt
+    def _time(self, x: _Copy, steps: int = 0) -> float:
+        return self._options.t_start + (x.count + steps) * self.dt
 
     def _shaped(self, x: np.ndarray) -> np.ndarray:
         """Return an array with the axis of copies only where there are copies."""
@@ -197,7 +202,7 @@ class Stepper:
         ModelError
             If inputs have another shape or are not finite.
         SimulationError
-            If the motion cannot continue. Its copy stays where that happened: `reset` it, or set `state`.
+            If the motion cannot continue. ``t`` is then the time before; `reset` its copy, or set `state`.
         """
         require_count(steps, "steps")
         if inputs is not None:
@@ -210,7 +215,10 @@ class Stepper:
         return self._shaped(self._outputs.copy())
 
     def _set_inputs(self, inputs: Any) -> None:
-        u = np.asarray(inputs, float)
+        try:
+            u = np.asarray(inputs, float)
+        except (TypeError, ValueError):
+            raise ModelError(f"inputs of the stepper are numbers in SI units, not {inputs!r}") from None
         shape = self._inputs.shape if self.copies is not None else self._inputs.shape[1:]
         if u.shape != shape:
             names = ", ".join(self.input_names) or "no inputs"
@@ -222,8 +230,8 @@ class Stepper:
     def _advance(self, k: int, steps: int) -> None:
         x = self._copies[k]
         x.motion.set_inputs(self._inputs[k])
+        x.motion.advance(self._time(x, steps))
         x.count += steps
-        x.motion.advance(self._time(x))
         self._measure(k)
 
     @cached_property
@@ -237,8 +245,9 @@ class Stepper:
         Parameters
         ----------
         values : mapping, optional
-            Coordinate such as ``"A.angle"`` or ``"cart.x"`` to its value [m or rad], or to value and rate; the
-            mechanism is assembled with them, as with `Initial`.
+            Coordinate such as ``"A.angle"`` or ``"cart.x"`` to its value, or to value and rate, numbers in SI units or
+            quantities such as ``"30 deg"``, None where one is free; the mechanism is assembled with them, as with
+            `Initial`.
         copy : int, optional
             Number of one copy; by default all copies are reset.
 
@@ -266,36 +275,40 @@ class Stepper:
 
     def _model_at(self, values: Mapping[str, float | Sequence[float]]) -> tuple[Model, dict[str, float]]:
         """Return the model with initial values that are parameters, and the values of these."""
+        if not isinstance(values, Mapping):
+            raise ModelError(f"values of a reset are a mapping such as {{'A.angle': (0.1, 2.0)}}, not {values!r}")
         numbers, described = dict[str, float](), []
         for k, (name, x) in enumerate(values.items()):
-            pair = tuple(x) if isinstance(x, Sequence | np.ndarray) else (x,)
-            if len(pair) > 2 or not pair:
+            pair = tuple(x) if isinstance(x, list | tuple) else (x,)
+            made = {}
+            unit = self._model.unit(name, Initial(name, value=0.0))
+            for field, given, per in zip(("value", "rate"), pair, ("", "/s"), strict=False):
+                if given is not None:
+                    made[field] = f"initial_{field}_{k}"
+                    numbers[made[field]] = float(number(given, {}, unit + per, f"{field} of {name!r} in reset"))
+            if len(pair) > 2 or not made:
                 raise ModelError(f"{name!r} is reset to a value, or to value and rate, not to {x!r}")
-            made = [f"{what}_{k}" for what in ("initial_value", "initial_rate")[: len(pair)]]
-            numbers |= dict(zip(made, map(float, pair), strict=True))
-            described.append(Initial(name, **dict(zip(("value", "rate"), made, strict=False))))
-        key = tuple((e.name, e.rate is not None) for e in described)
+            described.append(Initial(name, **made))
+        key = tuple((e.name, e.value is not None, e.rate is not None) for e in described)
         if key not in self._resets:
             out = self._model.copy()
             out.parameters.update(numbers)
             for e in described:
-                if any(i.name == e.name for i in out.initial):
-                    out.replace(e)
-                else:
-                    out.add(e)
+                out.initial = [i for i in out.initial if i.name != e.name]
+                out.add(e)
             self._resets[key] = out.snapshot()
         return self._resets[key], numbers
 
     @property
     def state(self) -> StepperState:
         """The complete state of all copies: setting it continues with the same bits."""
-        return StepperState(tuple((x, x.save()) for x in self._copies), self._inputs.copy())
+        return StepperState(self, tuple((x, x.save()) for x in self._copies), self._inputs.copy())
 
     @state.setter
     def state(self, saved: StepperState) -> None:
         """Return to a state that this stepper gave."""
-        if not isinstance(saved, StepperState) or len(saved.copies) != len(self._copies):
-            raise ModelError("the state is one that this stepper gave, with as many copies")
+        if not isinstance(saved, StepperState) or saved.owner is not self:
+            raise ModelError("the state is one that this stepper gave; others may have other parameters or methods")
         for k, (x, of_copy) in enumerate(saved.copies):
             x.restore(of_copy)
             self._copies[k] = x
@@ -363,15 +376,18 @@ def _way_of_motion(model: Model, o: StepperOptions) -> str:
         used = o.integration()
         return f"{used.method}, {f'steps of {used.step:g} s' if used.step else f'rtol {used.rtol:g}'}"
     if unknown:
-        why = f", which {switching[0]} needs" if switching else ""
+        other = next((x for x in switching if x not in unknown), "")
+        why = f" together with {other}" if other else ""
         raise ModelError(
-            f"a stepper of {name!r}: {IMPULSE_STEPPING}{why} does not support {unknown[0]}. Compute it between the "
-            "steps and give it as an input, or leave one of the two out"
+            f"a stepper of {name!r} does not support {unknown[0]}{why}; compute what it does between the steps, or "
+            "leave it out"
         )
-    if o.step is not None or o.coordinates == "joint":
-        given = "step=, whose Stepping(step=...) is" if o.step is not None else "coordinates='joint', since its are"
-        tail = " theirs" if o.step is not None else " absolute"
-        raise ModelError(f"{IMPULSE_STEPPING} does not take {given}{tail}; leave it out")
+    if o.step is not None:
+        raise ModelError(f"{IMPULSE_STEPPING} takes its step as method=fb.Stepping(step=...); leave step= out")
+    if o.rtol is not None:
+        raise ModelError(f"rtol has no effect with {IMPULSE_STEPPING}; leave it out")
+    if o.coordinates == "joint":
+        raise ModelError(f"{IMPULSE_STEPPING} uses absolute coordinates; leave coordinates='joint' out")
     return f"{IMPULSE_STEPPING}: {'as requested' if o.method != AUTO_METHOD else f'for {switching[0]}'}"
 
 
