@@ -80,7 +80,7 @@ def test_a_full_disk_is_said_and_leaves_what_was_there(tmp_path):
 def test_an_ending_that_is_not_known_is_refused(tmp_path):
     """With those that are, and the method that writes such files, if there is one."""
     for ending, write in writers(pendulum()):
-        for wrong in (".glb", ".csv" if ending == ".toml" else ".toml", ""):
+        for wrong in (".xyz", ".csv" if ending == ".toml" else ".toml", ""):
             with pytest.raises(fb.ModelError, match=rf"cannot write '.*x{wrong}'.*; it must be .*\{ending}"):
                 write(tmp_path / f"x{wrong}")
     with pytest.raises(fb.ModelError, match=r"'\.csv' is not known here; .*; to_csv writes \.csv"):

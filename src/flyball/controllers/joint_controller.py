@@ -77,11 +77,10 @@ class JointController(Controller):
             raise ModelError(f"{self.title}: coordinates names each coordinate once, at least one: {self.coordinates}")
         for name in self.referred:
             given = len(getattr(self, name))
-            one = name != "reference"  # may be given for all
-            if given != count and not (one and given == 1) and (given or name not in DERIVATIVES):
+            if given not in (1, count) and (given or name not in DERIVATIVES):
                 raise ModelError(
-                    f"{self.title}: {name} has {given} values for {count} coordinates; give one for each"
-                    f"{', or one for all' if one else ''}"
+                    f"{self.title}: {name} has {given} values for {count} coordinates; give one for each, or one "
+                    f"for all"
                 )
 
     def examine(self, model: Model) -> None:
