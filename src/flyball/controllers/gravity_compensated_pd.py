@@ -24,9 +24,9 @@ class GravityCompensatedPD(JointController):
     coordinates : list of str
         Coordinates of joints, all those of the model: ``["A.angle", "B.displacement"]``.
     reference : list of expressions [rad or m]
-        References r, one for each coordinate, or one for all, or one for all.
+        References r, one for each coordinate, or one for all.
     kp, kd : list of expressions [N m/rad and N m s/rad, or N/m and N s/m]
-        Gains of errors and of their rates, one for each coordinate, or one for all, or one for all.
+        Gains of errors and of their rates, one for each coordinate, or one for all.
     reference_rate : list of expressions, optional
         By default the derivative of the reference by time, which must then be an expression of ``t`` and parameters.
     base : str, optional
