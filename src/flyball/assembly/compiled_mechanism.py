@@ -199,9 +199,14 @@ class CompiledMechanism:
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Return the angles of joints that are coordinates, by name, with the sign of the angle states."""
+        return {name: sign * q[k] for name, (k, sign) in self.turning_coordinates.items()}
+
+    @cached_property
+    def turning_coordinates(self) -> dict[str, tuple[int, float]]:
+        """Angles of joints that are coordinates: name -> entry of q, and the sign of the angle state."""
         s = self.structure
         return {
-            f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["tree"].q[row]]
+            f"{t.joint.name}.{p.coordinate}": (int(s.tables["tree"].q[row]), t.joint.coordinates[p.coordinate].sign)
             for t, row, p in tree_joint_steps(s)
             if p.kind == "R" and p.coordinate in t.joint.coordinates
         }

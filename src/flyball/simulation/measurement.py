@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..assembly.assembled_state import initial_conditions
-from ..assembly.compiled_mechanism import compile_mechanism
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..engine.entry_point import POSITION
 from ..errors import ModelError
 from ..model.body import GROUND, Driver, Frame
@@ -21,7 +21,6 @@ from ..numerics.integrators.butcher_tableaux import tableau
 from ..numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ..tables.element_numbers import element_numbers
 from ..tables.law_inputs import element_laws
-from ..tables.structure_definition import Structure
 
 CHANGED_INPUT = 1.5  # factor of an input's value, to find out which numbers depend on it
 
@@ -157,21 +156,25 @@ class Measurement:
             np.array([1.0 / t.sign for t in terms]),
         )
 
-    def start(self, t: float, hints: Mapping[str, float], other: Structure) -> list[tuple[int, int]]:
-        """Take over time and angles with their whole turns at the start of a motion with another structure.
+    def start(
+        self, t: float, hints: Mapping[str, float], other: CompiledMechanism
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Take over time and angles with their whole turns at the start of a motion of another mechanism.
 
-        Returns the entries of controller states, angles and places in the state of that structure, and in this; the
-        motion counts these angles itself.
+        Returns the entries in its state of controller states, angles and places, those in this state, and factors: the
+        motion counts the turns of these angles itself, among them the angles of joints that are its coordinates.
         """
         self._time.t = t
         first = self.structure.nq + self.structure.nv
         for name, k in self.structure.state_at.items():
             if name in hints:
                 self.state[first + k] = hints[name]
-        there, own = other.nq + other.nv, self.structure.state_at
-        pairs = [(there + k, first + own[name]) for name, k in other.state_at.items() if name in own]
-        self._turns = self._counted_angles([k for _, k in pairs])
-        return pairs
+        s, own = other.structure, self.structure.state_at
+        found = {name: (s.nq + s.nv + k, 1.0) for name, k in s.state_at.items()} | other.turning_coordinates
+        shared = [(k, first + own[name], sign) for name, (k, sign) in found.items() if name in own]
+        there, here, sign = np.array(shared).reshape(-1, 3).T
+        self._turns = self._counted_angles(here.astype(np.int64).tolist())
+        return there.astype(np.int64), here.astype(np.int64), sign
 
     def update(self, t: float) -> None:
         """Evaluate at time t and the state; angles change by their mean rate since the last time, to a whole turn."""

@@ -131,12 +131,13 @@ class IntegratedMotion:
         n = self.structure.nq + self.structure.nv
         c = self.start.assembly.compiled
         hints = self.start.base.compiled.hints | c.hints | c.turned(self.start.assembly.q)
-        pairs = x.start(float(self.clock.real.t), hints, self.structure)
-        self._from, self._to = np.array([*((k, k) for k in range(n)), *pairs], np.int64).T
+        there, here, sign = x.start(float(self.clock.real.t), hints, c)
+        self._from, self._to = np.r_[np.arange(n), there], np.r_[np.arange(n), here]
+        self._sign = np.r_[np.ones(n), sign]
 
     def write_state(self, x: Measurement) -> None:
         """Write the state to the measurement."""
-        x.state[self._to] = self.clock.y.current.take(self._from)
+        x.state[self._to] = self._sign * self.clock.y.current.take(self._from)
 
     def save(self) -> IntegratedState:
         """Return copies of the integrator's state and the engine's workspace."""
@@ -188,7 +189,8 @@ class ImpulseMotion:
     ) -> None:
         base, scene, self.stepper, self.held, self.chosen = begin_by_impulses(model, t, o, parameters)
         self.stepper.state.times.now = t
-        self.structure = base.compiled.structure
+        self.c = base.compiled
+        self.structure = self.c.structure
         self._reference, self._hints = base.q.copy(), base.compiled.hints
         first = {k: scene.carriers.slices[k].start for k in self.structure.place if k in scene.carriers.slices}
         tree, free = self.structure.tables["tree"], len(self.stepper.free.turn)
@@ -216,10 +218,12 @@ class ImpulseMotion:
         now = float(self.stepper.state.times.now)
         self._from = self._to = np.zeros(0, np.int64)
         if not self.held:
-            x.start(now, self._hints, self.structure)
+            x.start(now, self._hints, self.c)
             return
-        s, whole = self.held.start.assembly.compiled.structure, self.structure
-        here, there, pairs = s.tables["tree"], whole.tables["tree"], x.start(now, self._hints, s)
+        own = self.held.start.assembly.compiled
+        s, whole = own.structure, self.structure
+        here, there, states = s.tables["tree"], whole.tables["tree"], x.start(now, self._hints, own)
+        pairs = list(zip(states[0].tolist(), states[1].tolist(), strict=True))
         for name, b in s.place.items():
             if b >= 0:
                 k = whole.place[name]
