@@ -146,9 +146,10 @@ class ClosedLoops:
             )
         G, _ = self._unit_rows(Constraints(arrays.jacobian, arrays.gamma))
         drift = np.abs((G @ v[..., None])[..., 0]).max(axis=1, initial=0.0)
-        if (drift > OFF_CONSTRAINTS * np.abs(v).max(axis=1, initial=0.0)).any():
+        wrong = drift > OFF_CONSTRAINTS * np.abs(v).max(axis=1, initial=0.0)
+        if wrong.any():
             raise AnalysisError(
-                f"the velocities of state {int(np.argmax(drift))} violate the constraints of {self._name!r}; with B of "
+                f"the velocities of state {int(np.argmax(wrong))} violate the constraints of {self._name!r}; with B of "
                 "dependent_velocities at zero velocity they are B w"
             )
 
@@ -279,9 +280,10 @@ class ClosedLoops:
         gamma = rows.gamma / norms
         off = np.abs((G @ a[..., None])[..., 0] - gamma).max(axis=1, initial=0.0)
         terms = (np.abs(G) @ np.abs(a)[..., None])[..., 0] + np.abs(gamma)
-        if (off > INCONSISTENT * terms.max(axis=1, initial=0.0)).any():
+        wrong = off > INCONSISTENT * terms.max(axis=1, initial=0.0)
+        if wrong.any():
             raise AnalysisError(
-                f"the accelerations do not satisfy the constraints of {self._name!r} at state {int(np.argmax(off))}: "
+                f"the accelerations do not satisfy the constraints of {self._name!r} at state {int(np.argmax(wrong))}: "
                 "with B and c of dependent_velocities they are B wdot + c"
             )
         n, sizes = len(drives), self.dynamics.compiled.sizes

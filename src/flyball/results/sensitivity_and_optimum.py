@@ -239,10 +239,10 @@ class Fit(Optimum):
         for k, (name, (low, high)) in enumerate(self.intervals.items()):
             at = next(i for i, (kind, text) in enumerate(out) if kind == "parameter" and text.startswith(f"{name}:"))
             out[at] = "parameter", f"{out[at][1]}, {percent}: {low:.6g} to {high:.6g}"
-            others = self.covariance[k] / (np.sqrt(np.diag(self.covariance)) * self.standard_errors[name])
-            others[k] = 0.0
-            if (most := int(np.abs(others).argmax())) != k and abs(others[most]) > STRONG_CORRELATION:
-                out.append(("correlation", f"{name} and {list(self.intervals)[most]}: {others[most]:.3f}"))
+            for i, other in list(enumerate(self.intervals))[:k]:
+                r = self.covariance[k, i] / (self.standard_errors[name] * self.standard_errors[other])
+                if abs(r) > STRONG_CORRELATION:
+                    out.append(("correlation", f"{other} and {name}: {r:.3f}"))
         units = dict(zip(self.of, self.units, strict=True))
         return [*out, *(("noise", f"{name}: {x:.4g} {units[name]}") for name, x in self.noise.items())]
 

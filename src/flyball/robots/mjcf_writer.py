@@ -50,7 +50,10 @@ UNLIMITED = 1e9
 """Bound of a joint with one stop, for MJCF limits joints on both sides [rad or m]."""
 SMALLEST_INERTIA = 1e-15
 """Mass and moments of inertia that MuJoCo demands of bodies that move (mjMINVAL)."""
-CONTROL = re.compile(r"(?:(?P<gear>[-+.\de]+)\*\()?(?:(?P<gain>[-+.\de]+)\*)?(?P<control>[A-Za-z_]\w*)\)?")
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+CONTROL = re.compile(
+    rf"(?:(?P<gear>{NUMBER})\*(?P<open>\())?(?:(?P<gain>{NUMBER})\*)?(?P<control>[A-Za-z_]\w*)(?(open)\))"
+)
 """Laws of actuators that have a counterpart: a parameter, or gear*(gain*parameter), as the reader writes them."""
 
 
@@ -284,6 +287,7 @@ class _Writer:
         self.written.add(c.name)
 
     def _actuators(self, tag: ET.Element) -> None:
+        controls: list[float] = []
         for e in self.model.forces:
             row = self._row_of(getattr(e, "coordinate", "")) if type(e) is Actuator else None
             law = CONTROL.fullmatch(e.force.replace(" ", "")) if row is not None and isinstance(e.force, str) else None  # type: ignore[attr-defined]
@@ -291,7 +295,10 @@ class _Writer:
                 continue
             gear = float(law["gear"] or 1.0) * float(law["gain"] or 1.0)
             ET.SubElement(tag, "motor", name=e.name, joint=self.joint_tags[row].attrib["name"], gear=repr(gear))
+            controls.append(float(self.values.env[law["control"]]))
             self.written.add(e.name)
+        if any(controls):  # MuJoCo's controls are zero but for keyframes
+            ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="as described", ctrl=_row(controls))
 
     def _report(self) -> None:
         rest = [e.title for e in self.model.elements() if e.name not in self.written]

@@ -131,6 +131,10 @@ class ParameterSearch:
         self.start = np.array([env[name] for name in self.names])
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.low, self.high = (self._bounds(o.to, k) for k in (0, 1))
+        for k in np.flatnonzero(self.low >= self.high):
+            raise ModelError(
+                f"the bounds of {self.names[k]!r} leave no value between them; give others, or leave it out"
+            )
         self._known: tuple[np.ndarray, Any] | None = None
         self.count = 0
         self._best: tuple[float, np.ndarray, Any] | None = None
@@ -404,7 +408,8 @@ def fit(model: Model, o: FitOptions) -> Fit:
     refuse_unsupported(model, "fit", controlled=True)
     m = _measurements(model, o.data)
     given = _noise(model, m, o.noise)
-    ranges = np.nanmax(m.values, axis=0) - np.nanmin(m.values, axis=0)
+    finite = np.where(m.known, m.values, np.nan)
+    ranges = np.nanmax(finite, axis=0) - np.nanmin(finite, axis=0)
     sigma = np.array([given.get(name, 0.0) for name in m.names])
     sigma = np.where(sigma > 0.0, sigma, np.where(ranges > 0.0, ranges, 1.0))
     found = optimize(model, o.optimization(m, np.where(m.known, 1.0 / sigma, 0.0), {}))
@@ -429,7 +434,10 @@ def _measurements(model: Model, data: Any) -> Measurements:
         If there is no such file or quantity, a unit does not fit, or times do not ascend.
     """
     columns = _columns_of_file(data) if isinstance(data, str | os.PathLike) else dict(data)
-    columns = {name.partition("[")[0].strip(): (name, x) for name, x in columns.items()}
+    names = [name.partition("[")[0].strip() for name in columns]
+    if repeated := next((x for k, x in enumerate(names) if x in names[:k]), None):
+        raise ModelError(f"two columns of the data are named {repeated!r}; leave one of them out")
+    columns = dict(zip(names, columns.items(), strict=True))
     time = next((columns.pop(k) for k in ("t", "time") if k in columns), None)
     if time is None or not columns:
         raise ModelError("the data need times, 't' or 'time', and at least one measured curve, such as 'slider.x [mm]'")
@@ -453,11 +461,14 @@ def _columns_of_file(path: str | os.PathLike) -> dict[str, Any]:
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             head, *rows = [row for row in csv.reader(file) if row]
+        head = [name.strip() for name in head]
+        if len(set(head)) < len(head) or any(len(row) != len(head) for row in rows):
+            raise ValueError("each line needs one entry for each heading, and no heading may occur twice")
         table = [[float(x) if x.strip() else np.nan for x in row] for row in rows]
-        return {name.strip(): [row[k] for row in table] for k, name in enumerate(head)}
+        return {name: [row[k] for row in table] for k, name in enumerate(head)}
     except OSError as error:
         raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
-    except (ValueError, IndexError) as error:
+    except (ValueError, csv.Error) as error:
         raise ModelError(f"{os.fspath(path)!r} is no table of numbers with a heading line: {error}") from None
 
 
@@ -495,6 +506,7 @@ def _with_intervals(
     o: FitOptions, m: Measurements, found: Optimum, derivatives: np.ndarray, sigma: np.ndarray, known: bool
 ) -> Fit:
     """Return the fit with the confidence intervals of its parameters."""
+    from scipy.stats import norm
     from scipy.stats import t as student
 
     names = list(found.parameters)
@@ -502,7 +514,7 @@ def _with_intervals(
     r = ((m.values - found.values) / sigma)[m.known]
     size = np.linalg.norm(J, axis=0)
     freedom = len(r) - len(names)
-    if freedom <= 0:
+    if freedom < (0 if known else 1):
         raise AnalysisError(f"{len(r)} measured values do not determine {len(names)} parameters and their uncertainty")
     _, s, V = np.linalg.svd(J / np.where(size > 0.0, size, 1.0), full_matrices=False)
     if not size.all() or s[-1] <= NOT_DETERMINED * s[0]:
@@ -514,7 +526,8 @@ def _with_intervals(
     variance = 1.0 if known else float(r @ r) / freedom
     covariance = variance * (V.T / s**2) @ V / np.outer(size, size)
     errors = np.sqrt(np.diag(covariance))
-    wide = float(student.ppf(0.5 + 0.5 * o.confidence, freedom)) * errors
+    tail = 0.5 + 0.5 * o.confidence
+    wide = float(norm.ppf(tail) if known else student.ppf(tail, freedom)) * errors
     best = np.array(list(found.parameters.values()))
     kept = {f.name: getattr(found, f.name) for f in fields(found)} | {"target": np.where(m.known, m.values, np.nan)}
     return Fit(

@@ -84,7 +84,7 @@ def _dependent_number(model: Model, other: Mapping[str, float]) -> str:
 
 
 def _equal(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    return all(repr(x) == repr(b[k]) for k, x in a.items())
+    return all(np.array_equal(x, b[k]) if isinstance(x, np.ndarray) else repr(x) == repr(b[k]) for k, x in a.items())
 
 
 class CountedAngles(NamedTuple):
@@ -176,11 +176,19 @@ class Measurement:
         self._turns = self._counted_angles(here.astype(np.int64).tolist())
         return there.astype(np.int64), here.astype(np.int64), sign
 
+    @property
+    def counts_turns(self) -> bool:
+        """Whether whole turns of angles are counted here, from one update to the next."""
+        return len(self._turns.state) > 0
+
     def update(self, t: float) -> None:
-        """Evaluate at time t and the state; angles change by their mean rate since the last time, to a whole turn."""
+        """Evaluate at time t and the state.
+
+        Angles are predicted with the mean of their rates at both times; the prediction selects the whole turn.
+        """
         turns, since = self._turns, t - float(self._time.t)
         self._time.t = t
-        if not len(turns.state):
+        if not self.counts_turns:
             self._evaluate(POSITION)
             return
         before, rate = self.state[turns.state], self._values[turns.rate]

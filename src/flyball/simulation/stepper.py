@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis_options import Options, require_count, require_positive, seconds
-from ..errors import ModelError
+from ..errors import FlyballError, ModelError
 from ..model.body import Initial
 from ..model.expressions import number
 from ..model.model import Model
@@ -52,12 +52,15 @@ class StepperOptions(Options):
         require_count(self.threads, "threads")
         if self.copies is not None:
             require_count(self.copies, "copies")
-        elif self.threads != 1:
+        if self.step is not None and self.rtol is not None:
+            raise ModelError("rtol has no effect with steps of fixed width (step=); leave one of the two out")
+        if self.copies is None and self.threads != 1:
             raise ModelError("threads divide copies; give their number, copies=, or leave threads out")
 
     def integration(self) -> Integration:
         """Return the options of an integration; they are checked."""
-        usual = default_integration(self.coordinates, self.rtol or DEFAULT_RTOL, None, MOST_STEPS)  # type: ignore[arg-type]
+        rtol = DEFAULT_RTOL if self.rtol is None else self.rtol
+        usual = default_integration(self.coordinates, rtol, None, MOST_STEPS)  # type: ignore[arg-type]
         method = usual.method if self.method == AUTO_METHOD else self.method
         return Integration(**{**usual.choices(), "method": method, "step": self.step})
 
@@ -84,7 +87,7 @@ class _Copy:
 
 @dataclass(frozen=True)
 class StepperState:
-    """A state of a `Stepper`, to which it can return. Its contents are the stepper's own affair."""
+    """A state of a `Stepper`, to which it can return; only `Stepper.state` reads it."""
 
     owner: object
     copies: tuple[tuple[_Copy, tuple[int, Any, Any]], ...]
@@ -207,12 +210,17 @@ class Stepper:
         require_count(steps, "steps")
         if inputs is not None:
             self._set_inputs(inputs)
+        numbers = range(len(self._copies))
         if self._pool is None:
-            for k in range(len(self._copies)):
-                self._advance(k, steps)
+            failed = [self._advance(k, steps) for k in numbers]
         else:
-            list(self._pool.map(self._advance, range(len(self._copies)), [steps] * len(self._copies)))
-        return self._shaped(self._outputs.copy())
+            failed = list(self._pool.map(self._advance, numbers, [steps] * len(self._copies)))
+        for k, error in enumerate(failed):  # all copies were advanced, whatever happened to one
+            if error is not None:
+                if self.copies is not None:
+                    error.args = (f"copy {k}: {error}", *error.args[1:])
+                raise error
+        return self.outputs()
 
     def _set_inputs(self, inputs: Any) -> None:
         try:
@@ -227,12 +235,22 @@ class Stepper:
             raise ModelError(f"inputs of the stepper must be finite, got {u.tolist()}")
         self._inputs[:] = u
 
-    def _advance(self, k: int, steps: int) -> None:
+    def _advance(self, k: int, steps: int) -> FlyballError | None:
+        """Advance a copy; returns why it cannot continue."""
         x = self._copies[k]
         x.motion.set_inputs(self._inputs[k])
-        x.motion.advance(self._time(x, steps))
-        x.count += steps
-        self._measure(k)
+        try:
+            at_once = 1 if x.measurement.counts_turns else steps
+            for _ in range(0, steps, at_once):
+                x.motion.advance(self._time(x, at_once))
+                x.count += at_once
+                x.motion.write_state(x.measurement)
+                x.measurement.update(self._time(x))
+        except FlyballError as error:
+            return error
+        finally:
+            x.measurement.outputs(self._outputs[k])
+        return None
 
     @cached_property
     def _pool(self) -> ThreadPoolExecutor | None:
@@ -271,7 +289,7 @@ class Stepper:
                 self._copies[k].restore(self._copies[k].start)
             self._inputs[k] = self._usual
             self._measure(k)
-        return self._shaped(self._outputs.copy())
+        return self.outputs()
 
     def _model_at(self, values: Mapping[str, float | Sequence[float]]) -> tuple[Model, dict[str, float]]:
         """Return the model with initial values that are parameters, and the values of these."""

@@ -132,8 +132,9 @@ class GltfScene:
         self.samplers: list[dict[str, Any]] = []
         self.channels: list[dict[str, Any]] = []
         self.moves = len(t) > 1 and t[-1] > t[0]
-        self.rows = np.unique(t, return_index=True)[1] if self.moves else np.array([0])
-        self.times = self._accessor((t[self.rows] - t[0]).astype(np.float32), bounds=True) if self.moves else -1
+        times = (t - t[0]).astype(np.float32)  # must ascend strictly as they are written
+        self.rows = np.unique(times, return_index=True)[1] if self.moves else np.array([0])
+        self.times = self._accessor(times[self.rows], bounds=True) if self.moves else -1
         self._materials: dict[str, int] = {}
 
     def _accessor(self, data: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
@@ -250,6 +251,9 @@ def _add_body(scene: GltfScene, body: RecordedBody, color: str) -> None:
     if not body.shapes:
         return
     own = [(_placed(s), HOLE_COLOR if s.hole else body.color or color) for s in body.shapes]
+    own = [part for part in own if len(part[0][1])]
+    if not own:
+        return
     scene.node(body.name, scene.mesh(own, body.name), body.p, body.q)
 
 

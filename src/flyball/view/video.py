@@ -121,22 +121,25 @@ def save_video(
     if speed is None:
         speed = playing_speed(duration) if duration > 0.0 else 1.0
     require_positive(speed, "speed")
-    count = max(1, round(duration / speed * frames_per_second))
-    times = recording.t[0] + np.arange(count + 1) * speed / frames_per_second
+    interval = 1.0 / frames_per_second
+    if ending == ".gif":  # whole hundredths of a second; browsers slow down what is faster than two
+        interval = max(2, round(100 * interval)) / 100
+    count = max(1, round(duration / speed / interval))
+    times = recording.t[0] + np.arange(count + 1) * speed * interval
     recording = resampled(recording, np.minimum(times, recording.t[-1]))
     frames = _frames(recording, width - width % 2, speed_in_words(speed))
     if ending == ".gif":
-        _write_gif(path, frames, frames_per_second)
+        _write_gif(path, frames, interval)
     else:
         _write_by_ffmpeg(path, ending, frames, frames_per_second)
 
 
-def _write_gif(path: Any, frames: Iterator[Image.Image], rate: int) -> None:
+def _write_gif(path: Any, frames: Iterator[Image.Image], interval: float) -> None:
     from PIL import Image
 
     first, *rest = (f.quantize(64, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE) for f in frames)
     with replacing_file(path, VIDEO) as file:
-        first.save(file, "GIF", save_all=True, append_images=rest, duration=round(1000 / rate), loop=0)
+        first.save(file, "GIF", save_all=True, append_images=rest, duration=round(1000 * interval), loop=0)
 
 
 def _write_by_ffmpeg(path: Any, ending: str, frames: Iterator[Image.Image], rate: int) -> None:
@@ -151,7 +154,8 @@ def _write_by_ffmpeg(path: Any, ending: str, frames: Iterator[Image.Image], rate
         command = [program, "-y", "-framerate", str(rate), "-i", str(Path(folder) / "%06d.png"), *codec]
         done = subprocess.run([*command, "-pix_fmt", "yuv420p", str(made)], capture_output=True, text=True, check=False)
         if done.returncode:
-            raise ModelError(f"ffmpeg cannot write {ending}: {done.stderr.strip().splitlines()[-1]}")
+            said = "; ".join(done.stderr.strip().splitlines()[-3:])
+            raise ModelError(f"ffmpeg cannot write {str(path)!r}: {said or f'it ended with {done.returncode}'}")
         with replacing_file(path, VIDEO) as file:
             file.write(made.read_bytes())
 

@@ -286,17 +286,19 @@ class ImpulseStepper:
         if depth == 0:
             raise NoSolution
         divides = int(self.state.options.divides_steps)
-        for _ in range(2):
-            self._set_step(0.5 * h)
-            self.state.counts.steps_left = 1
-            self.joints.count.accept_unsettled = depth == 1
-            self.state.options.divides_steps = divides and depth > 1
-            try:
-                self._call_loop()
-            except (NoSolution, StepTooLong):
-                self._halve_step(0.5 * h, depth - 1)
-        self.joints.count.accept_unsettled = 0
-        self.state.options.divides_steps = divides
+        try:
+            for _ in range(2):
+                self._set_step(0.5 * h)
+                self.state.counts.steps_left = 1
+                self.joints.count.accept_unsettled = depth == 1
+                self.state.options.divides_steps = divides and depth > 1
+                try:
+                    self._call_loop()
+                except (NoSolution, StepTooLong):
+                    self._halve_step(0.5 * h, depth - 1)
+        finally:
+            self.joints.count.accept_unsettled = 0
+            self.state.options.divides_steps = divides
 
     def _call_loop(self) -> None:
         """Take ``state.counts.steps_left`` steps, enlarging tables that are full."""
