@@ -295,7 +295,7 @@ def test_reset_of_described_values_and_quantities():
     m = cart_pole()
     m.add(fb.Initial("pin.angle", value=0.2, rate=1.0))
     sim = m.stepper(0.02, outputs=NAMES)
-    assert sim.reset({"pin.angle": "30 deg"})[2] == pytest.approx(np.pi / 6)
+    assert sim.reset({"pin.angle": "30 deg"})[2:4] == pytest.approx([np.pi / 6, 1.0])  # with the described rate
     assert sim.reset({"pin.angle": (0.5, "2 rad/s"), "rail.displacement": (None, 1.0)})[1:4] == pytest.approx(
         [1, 0.5, 2]
     )
@@ -354,3 +354,24 @@ def test_bad_inputs_are_refused():
     for u in (["a"], {"push": 1}, [1j]):
         with pytest.raises(fb.ModelError, match="numbers in SI units"):
             sim.step(u)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_one_copy_that_fails_does_not_stop_the_others(threads):
+    sim = cart_pole("1/(0.01 - value)").stepper(0.05, outputs=NAMES, copies=3, threads=threads)
+    for k, x in enumerate((-5.0, 0.0, -4.0)):
+        sim.reset({"rail.displacement": x}, copy=k)
+    with pytest.raises(fb.SimulationError, match=r"copy 1: .*cart and pole"):
+        sim.step(steps=40)
+    assert sim.t.tolist() == pytest.approx([2.0, 0.0, 2.0])
+
+
+def test_several_steps_at_once_are_the_same_steps():
+    """Also where turns of angles are counted from step to step."""
+    m = fb.Mechanism("wheel", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=0.1), fb.Revolute("A", "ground", "b", at=(0, 0)), fb.Motor("M", "A", torque="0"))
+    sims = [m.stepper(0.05, inputs=["M"], outputs=["A.angle"], coordinates="absolute") for _ in range(2)]
+    for u in (20.0, -30.0, 5.0):
+        for _ in range(10):
+            one = sims[0].step([u])
+        assert np.allclose(sims[1].step([u], steps=10), one, rtol=0, atol=1e-9)

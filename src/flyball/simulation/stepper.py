@@ -263,9 +263,9 @@ class Stepper:
         Parameters
         ----------
         values : mapping, optional
-            Coordinate such as ``"A.angle"`` or ``"cart.x"`` to its value, or to value and rate, numbers in SI units or
-            quantities such as ``"30 deg"``, None where one is free; the mechanism is assembled with them, as with
-            `Initial`.
+            Coordinate such as ``"A.angle"`` or ``"cart.x"`` to its value, or to value and rate: numbers in SI units or
+            quantities such as ``"30 deg"``, None where one is free. A value alone leaves a described rate. The
+            mechanism is assembled with them, as with `Initial`.
         copy : int, optional
             Number of one copy; by default all copies are reset.
 
@@ -298,7 +298,7 @@ class Stepper:
         numbers, described = dict[str, float](), []
         for k, (name, x) in enumerate(values.items()):
             pair = tuple(x) if isinstance(x, list | tuple) else (x,)
-            made = {}
+            made: dict[str, Any] = {}
             unit = self._model.unit(name, Initial(name, value=0.0))
             for field, given, per in zip(("value", "rate"), pair, ("", "/s"), strict=False):
                 if given is not None:
@@ -306,8 +306,11 @@ class Stepper:
                     numbers[made[field]] = float(number(given, {}, unit + per, f"{field} of {name!r} in reset"))
             if len(pair) > 2 or not made:
                 raise ModelError(f"{name!r} is reset to a value, or to value and rate, not to {x!r}")
+            kept = next((i for i in self._model.initial if i.name == name), None)
+            if len(pair) == 1 and kept is not None and kept.rate is not None:
+                made["rate"] = kept.rate
             described.append(Initial(name, **made))
-        key = tuple((e.name, e.value is not None, e.rate is not None) for e in described)
+        key = tuple((e.name, e.value is not None, e.rate) for e in described)
         if key not in self._resets:
             out = self._model.copy()
             out.parameters.update(numbers)
