@@ -30,7 +30,8 @@ class GravityCompensatedPD(JointController):
     reference_rate : list of expressions, optional
         By default the derivative of the reference by time, which must then be an expression of ``t`` and parameters.
     base : str, optional
-        Body that carries the joints, if it is not ground. The model has it fixed, in its drawn orientation.
+        Body that carries the joints, if it is not ground. The controller's model treats it as fixed in its reference
+        orientation, even if it moves: gravity then has another direction in a tilted robot.
     ignored : list of str, optional
         Bodies that the model lacks, with their joints: a load, parts that close loops.
     parameters : dict, optional

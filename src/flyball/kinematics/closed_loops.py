@@ -29,7 +29,7 @@ Array = np.ndarray
 RANK = 1e-9
 """Singular values, relative to the largest, up to which rows count as dependent; rows have unit length before."""
 NEARLY_DEPENDENT = 1e-6
-"""Relative singular values between `RANK` and this show a singular position: rows dependent there, and not nearby."""
+"""A relative singular value between `RANK` and this marks a position close to a singular one; the state is refused."""
 INCONSISTENT = 1e-6
 """Residual of constraints or forces, relative to the largest of the state, that counts as a contradiction."""
 OFF_CONSTRAINTS = 1e-6

@@ -3,7 +3,7 @@
 A body of MJCF is a body with the same reference frame; `qpos0` is the drawn configuration, and joints have the values
 they have in it (``ref``). A joint with several coordinates is a sequence of hinges and slides of one body. MuJoCo's
 constraints are soft: equalities are as hard as it permits. What the format cannot express is listed in a
-`ModelWarning`, or refused where the motion would be another one.
+`ModelWarning`, or refused where joints and bodies would differ.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from ..model.model import Model
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import assign, map_arrays
+from ..tables.table_definitions import assign, copied
 from .diagnosis import failure_reason
 from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, begin_by_impulses
 from .impulse_stepping.stepper import NoSolution, SavedState
@@ -141,16 +141,12 @@ class IntegratedMotion:
 
     def save(self) -> IntegratedState:
         """Return copies of the integrator's state and the engine's workspace."""
-        return IntegratedState(_copied(self.clock), _copied(self.c.work))
+        return IntegratedState(copied(self.clock), copied(self.c.work))
 
     def restore(self, saved: IntegratedState) -> None:
         """Return to a saved state."""
         assign(self.clock, saved.clock)
         assign(self.c.work, saved.work)
-
-
-def _copied(table: Any) -> Any:
-    return map_arrays(lambda _, x: x.copy(), table)
 
 
 def input_places(model: Model, inputs: Sequence[str]) -> np.ndarray:

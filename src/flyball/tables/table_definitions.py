@@ -312,6 +312,11 @@ def assign(to: Any, table: Any) -> None:
         x[...] = y
 
 
+def copied(table: Any) -> Any:
+    """Return a copy of a table with arrays of its own."""
+    return map_arrays(lambda _, x: x.copy(), table)
+
+
 def with_numbers(S: System, function: Callable[[str, np.ndarray], Any], names: Sequence[str] = NUMBERS) -> System:
     """Table with ``function(array, name)`` in place of each array of floats."""
     return S._replace(**{name: map_arrays(function, getattr(S, name), name) for name in names})

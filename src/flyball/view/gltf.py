@@ -26,6 +26,7 @@ VERTICES, INDICES = 34962, 34963  # targets of buffer views
 GLB_MAGIC, GLB_VERSION, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 ROUND, RINGS = 48, 24  # edges around an axis, and from pole to pole
 COILS, COIL_POINTS, WIRE_POINTS = 8, 24, 8  # of a spring; points of a turn and of the wire's cross-section
+WIRE_SHARE, WIRE_HEIGHT = 0.2, 0.05  # radius of the wire relative to the coil's, height relative to a turn's
 LINE_COLOR = "#5b6770"
 LINE_RADIUS = {"spring": 0.02, "damper": 0.015, "link": 0.01, "rope": 0.006, "arrow": 0.006}
 """Radius of lines, relative to the size of the mechanism."""
@@ -108,11 +109,10 @@ def _coil(radius: float) -> Surface:
     """Return a helix of a round wire along z from 0 to 1."""
     a = np.linspace(0.0, 2.0 * np.pi * COILS, COILS * COIL_POINTS + 1)
     wire = np.linspace(0.0, 2.0 * np.pi, WIRE_POINTS + 1)
-    thick = 0.2 * radius
-    out = radius + thick * np.cos(wire)
+    out = radius * (1.0 + WIRE_SHARE * np.cos(wire))
     x, y = np.cos(a)[:, None] * out, np.sin(a)[:, None] * out
-    # the wire is round in the plane of the axis; its height would be stretched with the spring, and is left out
-    z = np.broadcast_to((a / a[-1])[:, None], x.shape) + 0.25 / COILS * 0.2 * np.sin(wire)
+    # a small part of the distance of two coils is the wire's height: it is stretched with the spring along z
+    z = np.broadcast_to((a / a[-1])[:, None], x.shape) + WIRE_HEIGHT / COILS * np.sin(wire)
     vertices = np.stack([x, y, z], axis=2).reshape(-1, 3)
     return vertices, _grid_triangles(len(a), len(wire)), None
 

@@ -21,7 +21,7 @@ from ...numerics.complementarity.contact_problem import (
     allocate_solver,
     empty_problem,
 )
-from ...tables.table_definitions import Surfaces, assign, map_arrays, named_arrays
+from ...tables.table_definitions import Surfaces, assign, copied, named_arrays
 from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
 from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
@@ -156,11 +156,6 @@ class SavedState(NamedTuple):
 CONTACT_TABLES = ("now", "before", "midway", "search")  # of `ContactFinder`, which a step changes
 KEPT_WORKSPACES = ("P", "Q", "R", "X", "Y", "Z", "E", "W", "O", "T", "U")  # all but the solvers', which hold addresses
 CONSTANT_TABLES = ("S", "R", "door", "job")  # of `MechanismTables`: no state
-
-
-def _copied(table: Any) -> Any:
-    """Return a copy of a table with arrays of its own."""
-    return map_arrays(lambda _, x: x.copy(), table)
 
 
 def _shapes(tables: dict[str, Any]) -> list[tuple[int, ...]]:
@@ -339,10 +334,10 @@ class ImpulseStepper:
         """Return a copy of the state, from which the same steps give the same bits."""
         found, work = vars(self.finder), vars(self.workspaces)
         return SavedState(
-            _copied(self.free), _copied(self.movers), _copied(self.state),
-            {name: _copied(found[name]) for name in CONTACT_TABLES},
-            {name: _copied(work[name]) for name in KEPT_WORKSPACES},
-            {k: _copied(x) for k, x in self.joints._asdict().items() if k not in CONSTANT_TABLES},
+            copied(self.free), copied(self.movers), copied(self.state),
+            {name: copied(found[name]) for name in CONTACT_TABLES},
+            {name: copied(work[name]) for name in KEPT_WORKSPACES},
+            {k: copied(x) for k, x in self.joints._asdict().items() if k not in CONSTANT_TABLES},
         )  # fmt: skip
 
     def restore(self, saved: SavedState) -> None:
@@ -355,7 +350,7 @@ class ImpulseStepper:
         if _shapes({k: found[k] for k in CONTACT_TABLES}) != _shapes(saved.finder) or _shapes(
             {k: work[k] for k in KEPT_WORKSPACES}
         ) != _shapes(saved.workspaces):  # tables were enlarged since
-            found |= {name: _copied(x) for name, x in saved.finder.items()}
+            found |= {name: copied(x) for name, x in saved.finder.items()}
             self.joints.count.needed = len(saved.workspaces["P"].J)
             self.workspaces = make_workspaces(
                 len(self.finder.now.at), self.workspaces.P.node, self.turning, self.joints, self.state, self.solver
