@@ -208,7 +208,7 @@ def test_independent_coordinates_stay_as_they_are(make):
     )
     status, _ = c.at(0.0, q, v, MOTION)
     assert status == 0
-    settled = W.y[0].copy()
+    settled = W.trial.state.copy()
     W.options.stabilization = stabilization.NONE
     c.at(0.0, settled[:nq].copy(), settled[nq : nq + len(v)].copy())
     assert np.abs(W.rows.value).max() < ROUNDING

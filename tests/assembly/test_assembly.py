@@ -51,7 +51,7 @@ def closed(model, a):
     for j in model.joints:
         kinds = {r.axes for r in j.rows(model.planar)}
         if {"zx", "zy"} <= kinds:
-            F, M = (load_record(c.work.FK, s.frame_at[j.name, role, ""])[1] for role in "FM")
+            F, M = (load_record(c.work.frames, s.frame_at[j.name, role, ""])[1] for role in "FM")
             parallel[j.name] = F[2] * M[2] + F[5] * M[5] + F[8] * M[8]
     rates = c.jacobian() @ a.v - c.work.rows.nu
     return np.abs(c.work.rows.value).max(), np.abs(rates).max(), parallel
@@ -150,7 +150,7 @@ def test_an_antiparallel_start_comes_out_parallel(kind, turn):
     assert_closed(m, a)
     if kind in (fb.Prismatic, fb.Fixed):
         c = a.compiled
-        F, M = (load_record(c.work.FK, c.structure.frame_at["J", role, ""])[1] for role in "FM")
+        F, M = (load_record(c.work.frames, c.structure.frame_at["J", role, ""])[1] for role in "FM")
         assert pytest.approx(F, abs=1e-9) == M
 
 

@@ -24,8 +24,13 @@ from flyball.tables.table_definitions import (
     SPHERICAL,
     TREE_NV,
     WELD,
+    ArticulatedBodies,
     Bodies,
+    CompositeBodies,
+    KinematicRecords,
+    Pivots,
     Tree,
+    Twists,
     zero_table,
 )
 from tests.mechanisms import planar_rod
@@ -35,8 +40,10 @@ SIZES = range(12)
 
 def scratch(nb, nv, dtype=float):
     """The part of Work that trees use."""
-    shapes = {"BK": (nb, 24), "O": (nb, 3), "X": (nv, 14), "IC": (nb, 30), "M": (nv * (nv + 1) // 2,)}
-    return SimpleNamespace(**{name: np.zeros(shape, dtype) for name, shape in shapes.items()})
+    bodies = {"bodies": KinematicRecords, "composites": CompositeBodies, "articulated": ArticulatedBodies}
+    records = {name: of.blank(nb, dtype=dtype) for name, of in bodies.items()}
+    records |= {"twists": Twists.blank(nv, dtype=dtype), "pivots": Pivots.blank(nv, dtype=dtype)}
+    return SimpleNamespace(**records, O=np.zeros((nb, 3), dtype), M=np.zeros(nv * (nv + 1) // 2, dtype))
 
 
 def tables(parents, kinds):
@@ -66,8 +73,8 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
     flat = np.array([1, 1, 0]) if planar else np.ones(3)
     for b, kind in enumerate(kinds):
         p = centre + flat * random.normal(size=3)
-        W.BK[b, :3] = p
-        W.BK[b, 3:12] = (1, 0, 0, 0, 1, 0, 0, 0, 1) if planar else rotation(random)
+        W.bodies.position[b] = p
+        W.bodies.rotation[b] = (1, 0, 0, 0, 1, 0, 0, 0, 1) if planar else rotation(random)
         W.O[b] = p if kind in (FREE, PLANAR) else p + flat * random.normal(size=3)
         if not light[b]:
             A = random.normal(size=(3, 3))
@@ -77,27 +84,27 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
         n /= np.linalg.norm(n)
         v0 = S.tree.v[b]
         if kind == REVOLUTE:
-            W.X[v0, :3] = n
+            W.twists.angular[v0] = n
         elif kind == PRISMATIC:
-            W.X[v0, 3:6] = n
+            W.twists.linear[v0] = n
         elif kind == SPHERICAL:
-            W.X[v0 : v0 + 3, :3] = np.reshape(rotation(random), (3, 3))
+            W.twists.angular[v0 : v0 + 3] = np.reshape(rotation(random), (3, 3))
     return S, W
 
 
 def dense(S, W):
     """M as the sum over bodies of J^T m J."""
-    nb, nv = len(S.tree.parent), W.X.shape[0]
-    M = np.zeros((nv, nv), W.X.dtype)
+    nb, nv = len(S.tree.parent), W.twists.shape[0]
+    M = np.zeros((nv, nv), W.twists.dtype)
     for b in range(nb):
-        J = np.zeros((6, nv), W.X.dtype)
+        J = np.zeros((6, nv), W.twists.dtype)
         a = b
         while a >= 0:
             for k in range(S.tree.nv[a]):
                 w, v = twist_column(S, W, a, k)
-                J[:, S.tree.v[a] + k] = np.r_[w, np.add(v, np.cross(w, W.BK[b, :3] - W.O[a]))]
+                J[:, S.tree.v[a] + k] = np.r_[w, np.add(v, np.cross(w, W.bodies.position[b] - W.O[a]))]
             a = S.tree.parent[a]
-        R = W.BK[b, 3:12].reshape(3, 3)
+        R = W.bodies.rotation[b].reshape(3, 3)
         inertia = R @ S.bodies.inertia[b].reshape(3, 3) @ R.T
         M += S.bodies.mass[b] * J[3:].T @ J[3:] + J[:3].T @ inertia @ J[:3]
     return M
@@ -201,7 +208,7 @@ def test_prescribed_velocities_take_their_effort(seed, kind):
 def test_mechanisms_far_away_move_as_near_ones(seed):
     """The same forest 10 km from the world's origin: only the places themselves are rounded more coarsely there."""
     (S, W), (_, far) = forest(seed, massless=False), forest(seed, massless=False, centre=(1e4, -2e4, 5e3))
-    f = np.random.default_rng(seed).normal(size=W.X.shape[0])
+    f = np.random.default_rng(seed).normal(size=W.twists.shape[0])
     assert factor_articulated(S, W) == 0
     assert factor_articulated(S, far) == 0
     x, y = solved(S, W, f)[0], solved(S, far, f)[0]
@@ -215,8 +222,8 @@ def hinges(*axes):
     """Bodies without mass, each hung at the origin by a hinge on the one before it."""
     S = tables(np.arange(len(axes)) - 1, [REVOLUTE] * len(axes))
     W = scratch(len(axes), len(axes))
-    W.BK[:, 3:12] = np.eye(3).ravel()
-    W.X[:, :3] = axes / np.linalg.norm(axes, axis=1)[:, None]
+    W.bodies.rotation = np.eye(3).ravel()
+    W.twists.angular = axes / np.linalg.norm(axes, axis=1)[:, None]
     return S, W
 
 
@@ -248,7 +255,7 @@ def test_a_rod_does_not_resist_turning_about_itself(axis):
 def test_two_hinges_on_one_axis_share_no_inertia():
     S, W = hinges([1, 2, 3], [1, 2, 3])
     S.bodies.mass[1], S.bodies.inertia[1] = 1.0, np.diag([0.3, 0.5, 0.7]).ravel()
-    W.BK[1, :3] = 0.3, 0.1, -0.2
+    W.bodies.position[1] = 0.3, 0.1, -0.2
     assert factor_articulated(S, W) == 1
     S.bodies.mass[0], S.bodies.inertia[0] = 1e-9, 1e-9 * np.eye(3).ravel()
     assert factor_articulated(S, W) == 0, "a small inertia is one"
@@ -257,7 +264,7 @@ def test_two_hinges_on_one_axis_share_no_inertia():
 def test_complex_steps_go_through():
     """The derivative of accelerations by a mass: M dx/dm = -dM/dm x."""
     S, W = forest(9)
-    f, h = np.random.default_rng(0).normal(size=W.X.shape[0]), 1e-30
+    f, h = np.random.default_rng(0).normal(size=W.twists.shape[0]), 1e-30
     M = dense(S, W)
     b = int(np.argmax(S.bodies.mass))
     S.bodies = Bodies(*(x.astype(complex) for x in S.bodies))

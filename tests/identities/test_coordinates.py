@@ -140,7 +140,7 @@ def mass_matrix(c, t, q):
         c.at(t, q, unit)
         parts = []
         for b in range(len(S.tree.parent)):
-            _, R, w, u, _, _ = load_record(W.BK, b)
+            _, R, w, u, _, _ = load_record(W.bodies, b)
             parts.append(
                 (S.bodies.mass[b], np.array(u), S.bodies.inertia[b].reshape(3, 3), np.reshape(R, (3, 3)).T @ w)
             )

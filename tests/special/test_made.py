@@ -65,7 +65,7 @@ def solved(x, S, rows, stabilize=STAGES):
         W.options.position_tolerance,
         W.options.velocity_tolerance,
     ) = stabilize, 1e-13, 1e-12 * x.length, 1e-12
-    ny = W.y.shape[1]
+    ny = W.trial.shape[1]
     clock = ex.StepState(
         ex.StepReals.blank(), ex.StepCounts.blank(), np.zeros(0), ex.StateVectors.blank(ny), np.zeros((1, ny)),
         np.zeros(0, np.int64), np.zeros((INSPECTION_ROWS, 0)),

@@ -43,8 +43,8 @@ def engine_at(c, rng):
     c.z = z
     nm = len(s.measured)
     state = {"t": t} | {f"z[{k}]": x for k, x in enumerate(z)}
-    state |= {f"q[{k}]": x for k, x in enumerate(W.y[0, : s.nq])}
-    state |= {f"v[{k}]": x for k, x in enumerate(W.y[0, s.nq : s.nq + s.nv])}
+    state |= {f"q[{k}]": x for k, x in enumerate(W.trial.state[: s.nq])}
+    state |= {f"v[{k}]": x for k, x in enumerate(W.trial.state[s.nq : s.nq + s.nv])}
     state |= {f"load[{k}]": x for k, x in enumerate(W.sensed.load[2 * nm :])}
     M = np.zeros((s.nv, s.nv))
     i, j, _ = c.values.system.mass_entries

@@ -22,7 +22,7 @@ def engine(where, name):
     vdot = [values[n] for n in eq.vdot.rows]
     for role in "FM":
         at = s.frame_at["J", role, ""]
-        p, R, w, v, _, _ = (np.array(evaluate(list(x), given), float) for x in load_record(f.traced.work.FK, at))
+        p, R, w, v, _, _ = (np.array(evaluate(list(x), given), float) for x in load_record(f.traced.work.frames, at))
         frames[role] = p, R.reshape(3, 3), w, v
         end = {"F": s.model["J"].body_i, "M": s.model["J"].body_j}[role]
         body = {k: eq[f"{end}.{k}"].at(given | dict(zip(eq.vdot.rows, vdot, strict=True))) for k in MOTION}

@@ -85,7 +85,7 @@ def undefined_row(c: CompiledMechanism) -> str:
         singular = t.owner is not None and t.owner.coordinates[t.what].singular
         if s.term_code[k] is None and not singular:
             continue
-        par, F, M = row_parameters(S.term_parameters, k), load_record(W.FK, t.F), load_record(W.FK, t.M)
+        par, F, M = row_parameters(S.term_parameters, k), load_record(W.frames, t.F), load_record(W.frames, t.M)
         with np.errstate(all="ignore"):
             row = t.formula.of_kind.row(par, F, M, 0.0, S.const)
         finite = np.isfinite(np.hstack(row)).all()

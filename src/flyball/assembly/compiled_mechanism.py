@@ -154,7 +154,8 @@ class CompiledMechanism:
         """Set positions on curves to the nearest points at the poses last evaluated, independent of earlier ones."""
         for t in self.structure.terms:
             if t.formula.of_kind.place:
-                F, M = ((x[:3], x[3:12].reshape(3, 3)) for x in self.work.FK[[t.F, t.M]])
+                p, R = self.work.frames.position, self.work.frames.rotation.reshape(-1, 3, 3)
+                F, M = ((p[k], R[k]) for k in (t.F, t.M))
                 self.z[t.hint] = t.element.nearest(self.values.numbers[t.element.name], F, M)[0]  # type: ignore[attr-defined]
 
     @property
@@ -174,11 +175,11 @@ class CompiledMechanism:
         self.at(t, q, v)
         angles = turned_angles(self.values, W, q) if self.structure.model.planar else {}
         out = {}
-        K = W.BK.copy()
-        R = K[:, 3:12].reshape(-1, 3, 3)
+        K = W.bodies.copy()
+        p, v, w, R = K.position, K.velocity, K.angular_velocity, K.rotation.reshape(-1, 3, 3)
         for name, b in self.structure.place.items():
             if b >= 0:
-                out[name] = BodyState(K[b, :3], R[b], K[b, 15:18], K[b, 12:15], angles.get(name, 0.0))
+                out[name] = BodyState(p[b], R[b], v[b], w[b], angles.get(name, 0.0))
         return out
 
     def take(self, other: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -254,7 +254,7 @@ def position_rounding(c: CompiledMechanism) -> float:
     """Return the rounding of closed rows [m] at the positions last evaluated; it grows with the distance from the
     origin.
     """
-    return COORDINATE_ROUNDING * float(np.abs(c.work.FK[:, :3]).max(initial=0.0))
+    return COORDINATE_ROUNDING * float(np.abs(c.work.frames.position).max(initial=0.0))
 
 
 def movable_velocities(c: CompiledMechanism) -> np.ndarray:

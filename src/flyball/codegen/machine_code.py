@@ -41,7 +41,7 @@ PREDECESSORS: dict[str, tuple[str, ...]] = {
     "FINISH": ("PLACE", "MOVE"),
 } | dict.fromkeys(("FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "DRIFT"), ("PLACE",))
 """Procedures that have run, at this state, before another one does."""
-SHARED_ARRAYS = ("W_G", "W_FK")
+SHARED_ARRAYS = ("W_G", "W_frames")
 """Arrays that only the procedures write to."""
 ENTRIES = (
     "SCRATCH", "PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH",

@@ -44,14 +44,18 @@ from ..tables.table_definitions import (
     ROW_RESIDUAL,
     SCHUR,
     TERMS,
+    KinematicRecords,
     Sensed,
     System,
     Work,
+    Wrenches,
     with_numbers,
 )
 
 ROW = {name: first for name, (first, _) in Sensed.layout.entries.items()}
 """Rows of `Work.sensed` by name."""
+POSE = range(KinematicRecords.layout.entries["angular_velocity"][0])
+"""Entries of a kinematic record that are its pose."""
 PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that may be fixed in the code
 SOLVES = (
     "STEP",
@@ -202,13 +206,13 @@ class SolveProcedures(ProcedureRecorder):
         factor(S, W)
         stores = {SCHUR: self.array_entries("H"), COUPLED: self.array_entries("M"), ARTICULATED: []}[solver]
         if solver != ARTICULATED:
-            stores += self.array_entries("L") + self.stored("D", 0, range(len(W.D[0])))
+            stores += self.array_entries("L") + self.stored("ldl", 0, range(len(W.ldl.inverse_diagonal)))
             stores += self.stored("rows.diagonal", None, range(self.nr))
         self.add("FACTOR", {}, stores)
         reads: dict[int, Place] = {}
         if solver != ARTICULATED:
             reads |= self.again("H" if solver == SCHUR else "M") | self.again("L")
-            reads |= self.fresh("D", 0, range(len(W.D[0])))
+            reads |= self.fresh("ldl", 0, range(len(W.ldl.inverse_diagonal)))
         for name, is_loaded in (("STEP", True), ("STEP_UNLOADED", False)):
             self.stepped(name, is_loaded, reads)
         if solver != ARTICULATED:
@@ -322,28 +326,28 @@ class MechanismProcedures(SolveProcedures):
         stores = [x for name in ("value", "nu", "nu_dot") for x in self.stored(f"rows.{name}", None, rows)]
         stores += [(self.at("G", e), x) for e, x in enumerate(self.W.G)]
         stores += self.stored("sensed", ROW["value"], range(nm))
-        stores += [(self.at("T", k, c), x) for (k, c), x in np.ndenumerate(self.W.T)]
-        stores += [(self.at("FK", *e), self.W.FK[e]) for e in self.read_by_others if e[1] < 12]
+        stores += [(self.at("term_wrenches", k, c), x) for (k, c), x in np.ndenumerate(self.W.term_wrenches)]
+        stores += [(self.at("frames", *e), self.W.frames[e]) for e in self.read_by_others if e[1] in POSE]
         reads |= {**self.given("a", self.q), **self.given("b", self.z), **self.time}
         self.add("PLACE", reads, stores)
-        shown = [(self.at("FK", *e), self.W.FK[e]) for e in self.read_at_ends if e[1] < 12]
+        shown = [(self.at("frames", *e), self.W.frames[e]) for e in self.read_at_ends if e[1] in POSE]
         self.add("SHOW", self.given("a", self.q), shown)
 
     def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
         """Entries of the frames' records that other code reads; all positions if ``far``."""
-        S, FK, graph = self.S, self.W.FK, self.graph
+        S, frames, graph = self.S, self.W.frames, self.graph
         moving = range(S.sizes.ground_frames, S.sizes.moving_frames)
         asked = {(k, c) for k in moving for c in range(3)} if far else set()
         granted = len(graph.granted)
         for reader in readers:
-            trial = FK.copy()
+            trial = frames.copy()
             names = {}
             for k in moving:
-                for c in range(24):
-                    trial[k, c] = graph.symbol(f"FK[{k}, {c}]")
+                for c in range(frames.shape[1]):
+                    trial[k, c] = graph.symbol(f"frames[{k}, {c}]")
                     names[trial[k, c].index] = (k, c)
             try:
-                found = reader(self.W._replace(FK=trial))
+                found = reader(self.W._replace(frames=trial))
             except UndeterminedDecision:
                 found = list(trial[list(moving)].ravel())
             asked |= {names[x.index] for x in ordered_operations(found, {}) if x.index in names}
@@ -354,7 +358,8 @@ class MechanismProcedures(SolveProcedures):
         """Whether the rates of places on curves can be expressed."""
         granted = len(self.graph.granted)
         try:
-            self._place_rates(self.W._replace(FK=self.numbered("FK?", self.W.FK.size).reshape(self.W.FK.shape)))
+            frames = self.numbered("frames?", self.W.frames.size).reshape(self.W.frames.shape)
+            self._place_rates(self.W._replace(frames=frames.view(KinematicRecords)))
         except UndeterminedDecision:
             return False
         finally:
@@ -381,9 +386,10 @@ class MechanismProcedures(SolveProcedures):
     def _weighed(self, W: Work) -> list[Any]:
         if not len(self.S.load_terms.load):
             return []
-        T, lam, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
-                          for n, x in (("T", W.T), ("lam", W.rows.multiplier), ("sensed", W.sensed)))  # fmt: skip
-        reaction_loads(self.S, W._replace(T=T, rows=W.rows._replace(multiplier=lam), sensed=sensed.view(Sensed)))
+        arrays = {"term_wrenches": W.term_wrenches, "multiplier": W.rows.multiplier, "sensed": W.sensed}
+        wrenches, lam, sensed = (self.numbered(f"{n}?", x.size).reshape(x.shape) for n, x in arrays.items())
+        W = W._replace(term_wrenches=wrenches.view(Wrenches), sensed=sensed.view(Sensed))
+        reaction_loads(self.S, W._replace(rows=W.rows._replace(multiplier=lam)))
         return list(sensed.ravel())
 
     def moved(self) -> None:
@@ -393,7 +399,8 @@ class MechanismProcedures(SolveProcedures):
         stores = self.stored("rows.gamma", None, range(self.nr))
         stores += self.stored("sensed", ROW["rate"], range(nm)) + self.stored("sensed", ROW["bias"], range(nm))
         stores += self.stored("sensed", ROW["value"], range(nm, 2 * nm))
-        stores += [(self.at("FK", *e), self.W.FK[e]) for e in (*self.read_by_others, *self.read_at_ends) if e[1] >= 12]
+        read = (*self.read_by_others, *self.read_at_ends)
+        stores += [(self.at("frames", *e), self.W.frames[e]) for e in read if e[1] not in POSE]
         self.add("MOVE", {**self.given("a", self.v), **self.given("b", self.z), **self.time}, stores)
 
     def loaded(self) -> None:

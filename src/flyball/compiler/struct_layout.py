@@ -89,9 +89,10 @@ class Record(np.ndarray):
 
     ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
     annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
-    each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``. With ``vectors=True`` each entry is a row
-    of the array, of any length: annotated as `Column` it is read number by number, as `Float1` it is an array. There
-    may be further rows. ``Annotated[np.ndarray, "mass"]`` is another name of ``mass``.
+    each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``; further dimensions, such as time, may
+    follow. With ``vectors=True`` each entry is a row of the array, of any length: annotated as `Column` it is read
+    number by number, as `Float1` it is an array. There may be further rows. ``Annotated[np.ndarray, "mass"]`` is
+    another name of ``mass``.
     """
 
     layout: ClassVar[RecordForm]
@@ -110,16 +111,16 @@ class Record(np.ndarray):
         cls.layout = RecordForm(entries, width, kind, rows, vectors, arrays)
 
     @classmethod
-    def blank(cls, *count: int) -> Any:
-        """Record of zeros; of so many rows, or of vectors of such a length."""
-        dtype: type = {"Int": np.int64, "Short": np.int32}.get(cls.layout.kind, np.float64)
+    def blank(cls, *count: int, dtype: Any = None) -> Any:
+        """Record of zeros; of so many rows, or of vectors of such a length; ``dtype``: another type of number."""
+        dtype = dtype or {"Int": np.int64, "Short": np.int32}.get(cls.layout.kind, np.float64)
         shape = (cls.layout.width, *count) if cls.layout.vectors else (*count, cls.layout.width)
         return np.zeros(shape, dtype).view(cls)
 
 
 def _entry_property(first: int, count: int, rows: bool, vectors: bool) -> property:
     where = first if count == 1 else slice(first, first + count)
-    place = where if vectors else (..., where)
+    place = (slice(None), where) if rows else where
 
     def get(self: Record) -> Any:
         return self.view(np.ndarray)[place] if count > 1 or rows or vectors else self[first]

@@ -97,7 +97,7 @@ def turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
     for b in range(len(S.tree.parent)):
         v0, n = int(S.tree.v[b]), int(S.tree.nv[b])
         own = _body_turning_matrix(
-            np.array(x.c.work.BK[b, 3:12]).reshape(3, 3), np.array(x.c.work.BK[b, 12:15]), turning
+            np.array(x.c.work.bodies.rotation[b]).reshape(3, 3), np.array(x.c.work.bodies.angular_velocity[b]), turning
         )
         kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no rotation
         H[v0 : v0 + n, v0 : v0 + n] = own[np.ix_(kept, kept)]
@@ -324,7 +324,7 @@ def _advanced_state(x: MechanismState, frame: TurningFrame) -> tuple[float, Mech
     S, W = c.values.system, c.work
     h = (
         COMPARISON_ANGLE
-        / max(np.abs(W.BK[:, 12:15]).max(), np.abs(W.BK[:, 15:18]).max() / c.values.length)
+        / max(np.abs(W.bodies.angular_velocity).max(), np.abs(W.bodies.velocity).max() / c.values.length)
         / COMPARISON_STEPS
     )
     half, v = expm(0.5 * h * frame.H), x.v

@@ -16,8 +16,8 @@ itself is not formed. Gravity, gyroscopic terms and bias accelerations are conta
 velocity that a driver prescribes is not eliminated: its acceleration is given, and the driver's effort is computed.
 
 Parents precede their children in the body table. Where a body directly follows its parent, as in a chain, the
-quantities passed between the two stay in registers; all others are stored in W.IC[b]. W.X[d] holds the twist of
-velocity d, then U, D and 1 / D.
+quantities passed between the two stay in registers; all others are stored in row b of
+`ArticulatedBodies`. `Pivots` holds U, D and 1 / D of each velocity.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from .kinematics import twist_column
 
 
 @formula
-def load_symmetric(A, k, o):
-    """Load a symmetric matrix (xx, xy, xz, yy, yz, zz) from row k of a table, columns o to o + 5."""
-    return (A[k, o], A[k, o + 1], A[k, o + 2], A[k, o + 3], A[k, o + 4], A[k, o + 5])
+def load_symmetric(A, k):
+    """Load the symmetric matrix (xx, xy, xz, yy, yz, zz) in row k of a table."""
+    return (A[k, 0], A[k, 1], A[k, 2], A[k, 3], A[k, 4], A[k, 5])
 
 
 @formula
-def store_symmetric(A, k, o, a):
-    """Write a symmetric matrix into row k of a table, from column o."""
-    A[k, o] = a[0]
-    A[k, o + 1] = a[1]
-    A[k, o + 2] = a[2]
-    A[k, o + 3] = a[3]
-    A[k, o + 4] = a[4]
-    A[k, o + 5] = a[5]
+def store_symmetric(A, k, a):
+    """Write a symmetric matrix into row k of a table."""
+    A[k, 0] = a[0]
+    A[k, 1] = a[1]
+    A[k, 2] = a[2]
+    A[k, 3] = a[3]
+    A[k, 4] = a[4]
+    A[k, 5] = a[5]
 
 
 @formula
@@ -86,8 +86,8 @@ def body_inertia(S, W, b, point):
     m = S.bodies.mass[b]
     if m == 0.0:
         return m, (m, m, m), (m, m, m, m, m, m)
-    J = rotated_inertia(load9(W.BK, b, 3), load9(S.bodies.inertia, b, 0))
-    r = sub(load3(W.BK, b, 0), point)
+    J = rotated_inertia(load9(W.bodies.rotation, b, 0), load9(S.bodies.inertia, b, 0))
+    r = sub(load3(W.bodies.position, b, 0), point)
     return m, scale(m, r), shifted_inertia(J, scale(0.5 * m, r), r)
 
 
@@ -110,15 +110,15 @@ def shifted_inertia(J, e, d):
 
 @formula
 def store_root_twists(S, W, b):
-    """Store the twist columns of body b in W.X if it is a root: FREE, PLANAR or POINT.
+    """Store the twist columns of body b in `Work.twists` if it is a root: FREE, PLANAR or POINT.
 
     Those of all other bodies are there already.
     """
     if S.tree.joint[b] <= POINT:
         for k in range(S.tree.nv[b]):
             w, v = twist_column(S, W, b, k)
-            store3(W.X, S.tree.v[b] + k, 0, w)
-            store3(W.X, S.tree.v[b] + k, 3, v)
+            store3(W.twists.angular, S.tree.v[b] + k, 0, w)
+            store3(W.twists.linear, S.tree.v[b] + k, 0, v)
 
 
 @formula
@@ -127,25 +127,25 @@ def update_composite_bodies(S, W):
 
     Also stores the vector from the reference point of the root's parent to that of the root.
     """
-    C = W.IC
+    C = W.composites
     n = S.tree.parent.shape[0]
     for b in range(n):
         store_root_twists(S, W, b)
         m, h, J = body_inertia(S, W, b, load3(W.O, b, 0))
-        C[b, 0] = m
-        store3(C, b, 1, h)
-        store_symmetric(C, b, 4, J)
+        C.mass[b] = m
+        store3(C.first_moment, b, 0, h)
+        store_symmetric(C.inertia, b, J)
     for b in range(n - 1, -1, -1):
         a = S.tree.parent[b]
         if a >= 0:
-            m, h = C[b, 0], load3(C, b, 1)
+            m, h = C.mass[b], load3(C.first_moment, b, 0)
             d = sub(load3(W.O, b, 0), load3(W.O, a, 0))
             to = scale(m, d)
-            J = shifted_inertia(load_symmetric(C, b, 4), add(h, scale(0.5, to)), d)
-            C[a, 0] += m
-            store3(C, a, 1, add(load3(C, a, 1), add(h, to)))
-            store_symmetric(C, a, 4, add_symmetric(load_symmetric(C, a, 4), J))
-            store3(C, b, 10, d)
+            J = shifted_inertia(load_symmetric(C.inertia, b), add(h, scale(0.5, to)), d)
+            C.mass[a] += m
+            store3(C.first_moment, a, 0, add(load3(C.first_moment, a, 0), add(h, to)))
+            store_symmetric(C.inertia, a, add_symmetric(load_symmetric(C.inertia, a), J))
+            store3(C.offset, b, 0, d)
 
 
 @formula
@@ -155,34 +155,30 @@ def mass_entries(S, W):
     An entry is the momentum of the subtree at unit velocity, projected on the twist column of the body or ancestor.
     """
     update_composite_bodies(S, W)
-    C = W.IC
+    C = W.composites
     e = 0
     for b in range(S.tree.parent.shape[0]):
-        h = load3(C, b, 1)
+        h = load3(C.first_moment, b, 0)
         for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
-            w, v = load3(W.X, d, 0), load3(W.X, d, 3)
+            w, v = load3(W.twists.angular, d, 0), load3(W.twists.linear, d, 0)
             force = cross(w, h)
-            moment = symmetric(load_symmetric(C, b, 4), w)
+            moment = symmetric(load_symmetric(C.inertia, b), w)
             if S.tree.joint[b] != REVOLUTE:
-                force, moment = add(force, scale(C[b, 0], v)), add(moment, cross(h, v))
+                force, moment = add(force, scale(C.mass[b], v)), add(moment, cross(h, v))
             a = b
             while a >= 0:
                 a0 = S.tree.v[a]
                 if S.tree.joint[a] == REVOLUTE:
-                    W.M[e] = dot(load3(W.X, a0, 0), moment)
+                    W.M[e] = dot(load3(W.twists.angular, a0, 0), moment)
                     e += 1
                 else:
                     for i in range(a0, min(a0 + S.tree.nv[a], d + 1)):
-                        W.M[e] = dot(load3(W.X, i, 0), moment) + dot(load3(W.X, i, 3), force)
+                        W.M[e] = dot(load3(W.twists.angular, i, 0), moment) + dot(load3(W.twists.linear, i, 0), force)
                         e += 1
-                moment = add(moment, cross(load3(C, a, 10), force))
+                moment = add(moment, cross(load3(C.offset, a, 0), force))
                 a = S.tree.parent[a]
 
 
-# columns of W.IC: parts of an inertia, after J; whether a pending inertia is stored; pending wrench or acceleration
-COUPLING, LINEAR, ELIMINATED, TOTAL_MASS, HAS_PENDING, PASSED_ON = 6, 15, 21, 22, 23, 24
-# columns of W.X
-RESPONSE, PIVOT, PIVOT_INVERSE = 6, 12, 13
 PIVOT_ROUNDING = 1e-14  # relative to the inertia with all joints beyond locked; a smaller pivot counts as zero
 
 
@@ -195,11 +191,11 @@ def factor_articulated(S, W):
     int
         0, or 1 + the index of the velocity that moves no inertia.
     """
-    A = W.IC
+    A = W.articulated
     n = S.tree.parent.shape[0]
     o = 0.0 * W.O[0, 0]
     for b in range(n):
-        A[b, HAS_PENDING] = o
+        A.stored[b] = o
     I = zero_inertia(o)
     for b in range(n - 1, -1, -1):
         store_root_twists(S, W, b)
@@ -237,25 +233,25 @@ def add_inertias(I, other):
 def pending_inertia(A, b):
     """Sum of the inertias that children have stored for body b."""
     return (
-        load_symmetric(A, b, 0),
-        load9(A, b, COUPLING),
-        load_symmetric(A, b, LINEAR),
-        A[b, ELIMINATED],
-        A[b, TOTAL_MASS],
+        load_symmetric(A.rotational, b),
+        load9(A.coupling, b, 0),
+        load_symmetric(A.linear, b),
+        A.eliminated[b],
+        A.mass[b],
     )
 
 
 @formula
 def add_pending_inertia(A, b, I):
     """Add an inertia to the one stored for body b."""
-    if A[b, HAS_PENDING].real > 0.0:
+    if A.stored[b].real > 0.0:
         I = add_inertias(I, pending_inertia(A, b))
-    store_symmetric(A, b, 0, I[0])
-    store9(A, b, COUPLING, I[1])
-    store_symmetric(A, b, LINEAR, I[2])
-    A[b, ELIMINATED] = I[3]
-    A[b, TOTAL_MASS] = I[4]
-    A[b, HAS_PENDING] = 1.0
+    store_symmetric(A.rotational, b, I[0])
+    store9(A.coupling, b, 0, I[1])
+    store_symmetric(A.linear, b, I[2])
+    A.eliminated[b] = I[3]
+    A.mass[b] = I[4]
+    A.stored[b] = 1.0
 
 
 @formula
@@ -265,8 +261,8 @@ def add_body_inertia(S, W, b, I):
     m, h, own = body_inertia(S, W, b, load3(W.O, b, 0))
     H = (H[0], H[1] - h[2], H[2] + h[1], H[3] + h[2], H[4], H[5] - h[0], H[6] - h[1], H[7] + h[0], H[8])
     I = add_symmetric(J, own), H, (K[0] + m, K[1], K[2], K[3] + m, K[4], K[5] + m), lost, mass + m
-    if W.IC[b, HAS_PENDING].real > 0.0:
-        I = add_inertias(I, pending_inertia(W.IC, b))
+    if W.articulated.stored[b].real > 0.0:
+        I = add_inertias(I, pending_inertia(W.articulated, b))
     return I
 
 
@@ -280,7 +276,7 @@ def eliminate_velocities(S, W, b, I):
     size = J[0] + J[3] + J[5] + lost
     v0 = S.tree.v[b]
     for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
-        w, v = load3(W.X, d, 0), load3(W.X, d, 3)
+        w, v = load3(W.twists.angular, d, 0), load3(W.twists.linear, d, 0)
         t, f = symmetric(J, w), mtv(H, w)
         D = dot(w, t)
         least = size
@@ -288,14 +284,14 @@ def eliminate_velocities(S, W, b, I):
             t, f = add(t, mv(H, v)), add(f, symmetric(K, v))
             D = dot(w, t) + dot(v, f)
             least = dot(w, w) * size + dot(v, v) * mass
-        store3(W.X, d, RESPONSE, t)
-        store3(W.X, d, RESPONSE + 3, f)
-        W.X[d, PIVOT] = D
+        store3(W.pivots.torque, d, 0, t)
+        store3(W.pivots.force, d, 0, f)
+        W.pivots.inertia[d] = D
         if S.tree.law[b] < 0:
             if not positive(D - PIVOT_ROUNDING * least):
                 return 1 + d, (J, H, K, lost, mass)
             r = 1.0 / D
-            W.X[d, PIVOT_INVERSE] = r
+            W.pivots.inverse_inertia[d] = r
             y, z = scale(r, t), scale(r, f)
             J, H, K = downdate_symmetric(J, t, y), downdate_coupling(H, t, z), downdate_symmetric(K, f, z)
             lost = lost + dot(t, y)
@@ -359,14 +355,14 @@ def solve_articulated(S, W, f, x, effort):
         Output at the velocities that a driver prescribes: the generalised force (M x - f)[d] that the driver adds.
         The other entries are not changed.
     """
-    A = W.IC
+    A = W.articulated
     n = S.tree.parent.shape[0]
     o = 0.0 * W.O[0, 0]
     zero = (o, o, o)
     for b in range(n):
-        if A[b, HAS_PENDING].real > 0.0:
-            store3(A, b, PASSED_ON, zero)
-            store3(A, b, PASSED_ON + 3, zero)
+        if A.stored[b].real > 0.0:
+            store3(A.torque, b, 0, zero)
+            store3(A.force, b, 0, zero)
     moment, force = zero, zero
     for b in range(n - 1, -1, -1):
         moment, force = pass_wrench_inwards(S, W, b, (moment, force), f, x, effort)
@@ -375,8 +371,8 @@ def solve_articulated(S, W, f, x, effort):
             moment = add(moment, cross(sub(load3(W.O, b, 0), load3(W.O, a, 0)), force))
         if a != b - 1:
             if a >= 0:
-                store3(A, a, PASSED_ON, add(load3(A, a, PASSED_ON), moment))
-                store3(A, a, PASSED_ON + 3, add(load3(A, a, PASSED_ON + 3), force))
+                store3(A.torque, a, 0, add(load3(A.torque, a, 0), moment))
+                store3(A.force, a, 0, add(load3(A.force, a, 0), force))
             moment, force = zero, zero
     turn, shift = zero, zero
     for b in range(n):
@@ -385,34 +381,34 @@ def solve_articulated(S, W, f, x, effort):
             turn, shift = zero, zero
         else:
             if a != b - 1:
-                turn, shift = load3(A, a, PASSED_ON), load3(A, a, PASSED_ON + 3)
+                turn, shift = load3(A.angular_acceleration, a, 0), load3(A.acceleration, a, 0)
             shift = add(shift, cross(turn, sub(load3(W.O, b, 0), load3(W.O, a, 0))))
         turn, shift = pass_acceleration_outwards(S, W, b, (turn, shift), x, effort)
-        if A[b, HAS_PENDING].real > 0.0:
-            store3(A, b, PASSED_ON, turn)
-            store3(A, b, PASSED_ON + 3, shift)
+        if A.stored[b].real > 0.0:
+            store3(A.angular_acceleration, b, 0, turn)
+            store3(A.acceleration, b, 0, shift)
 
 
 @formula
 def pass_wrench_inwards(S, W, b, wrench, f, x, effort):
-    """Wrench that body b passes to its parent, from the wrench passed to it and the pending one in W.IC.
+    """Wrench that body b passes to its parent, from the wrench passed to it and the stored one.
 
     The remaining forces along its own velocities go to x, or to effort where a driver prescribes them.
     """
     t, p = wrench
-    if W.IC[b, HAS_PENDING].real > 0.0:
-        t, p = add(t, load3(W.IC, b, PASSED_ON)), add(p, load3(W.IC, b, PASSED_ON + 3))
+    if W.articulated.stored[b].real > 0.0:
+        t, p = add(t, load3(W.articulated.torque, b, 0)), add(p, load3(W.articulated.force, b, 0))
     v0 = S.tree.v[b]
     for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
-        u = f[d] - (dot(load3(W.X, d, 0), t) + dot(load3(W.X, d, 3), p))
+        u = f[d] - (dot(load3(W.twists.angular, d, 0), t) + dot(load3(W.twists.linear, d, 0), p))
         if S.tree.law[b] < 0:
             x[d] = u
-            s = u * W.X[d, PIVOT_INVERSE]
+            s = u * W.pivots.inverse_inertia[d]
         else:
             effort[d] = u
             s = x[d]
-        t = add(t, scale(s, load3(W.X, d, RESPONSE)))
-        p = add(p, scale(s, load3(W.X, d, RESPONSE + 3)))
+        t = add(t, scale(s, load3(W.pivots.torque, d, 0)))
+        p = add(p, scale(s, load3(W.pivots.force, d, 0)))
     return t, p
 
 
@@ -421,11 +417,11 @@ def pass_acceleration_outwards(S, W, b, parent_acceleration, x, effort):
     """Accelerations of body b: along its velocities (stored in x) and as a body, given its parent's acceleration."""
     w, v = parent_acceleration
     for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
-        s = dot(load3(W.X, d, RESPONSE), w) + dot(load3(W.X, d, RESPONSE + 3), v)
+        s = dot(load3(W.pivots.torque, d, 0), w) + dot(load3(W.pivots.force, d, 0), v)
         if S.tree.law[b] < 0:
-            x[d] = (x[d] - s) * W.X[d, PIVOT_INVERSE]
+            x[d] = (x[d] - s) * W.pivots.inverse_inertia[d]
         else:
-            effort[d] = W.X[d, PIVOT] * x[d] + s - effort[d]
-        w = add(w, scale(x[d], load3(W.X, d, 0)))
-        v = add(v, scale(x[d], load3(W.X, d, 3)))
+            effort[d] = W.pivots.inertia[d] * x[d] + s - effort[d]
+        w = add(w, scale(x[d], load3(W.twists.angular, d, 0)))
+        v = add(v, scale(x[d], load3(W.twists.linear, d, 0)))
     return w, v

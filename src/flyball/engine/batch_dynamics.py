@@ -135,8 +135,8 @@ def frame_pose(W, frame, out):
     p, r, b = position(frame), frame.rotation, frame.body[0]
     R = (r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8])
     if b >= 0:
-        A = load9(W.BK, b, 3)
-        p, R = add(load3(W.BK, b, 0), mv(A, p)), mm(A, R)
+        A = load9(W.bodies.rotation, b, 0)
+        p, R = add(load3(W.bodies.position, b, 0), mv(A, p)), mm(A, R)
     for i in range(3):
         out[i] = p[i]
     for i in range(9):

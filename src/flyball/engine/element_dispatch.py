@@ -24,8 +24,8 @@ from .rows import row_parameters
 def turn_rates(S, W, z, dz):
     """Rates of the states that count turns of angles."""
     for k in range(S.angles.F.shape[0]):
-        F = load_record(W.FK, S.angles.F[k])
-        M = load_record(W.FK, S.angles.M[k])
+        F = load_record(W.frames, S.angles.F[k])
+        M = load_record(W.frames, S.angles.M[k])
         n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
         dz[S.angles.state[k]] = dot(n, sub(M[2], F[2]))
 
@@ -34,8 +34,8 @@ def turn_rates(S, W, z, dz):
 def curve_place_rates(S, W, z, dz, kind, foot, progress):
     """Rates of the states that hold the places of a kind's terms on their curves."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-        F = load_record(W.FK, S.terms.F[k])
-        M = load_record(W.FK, S.terms.M[k])
+        F = load_record(W.frames, S.terms.F[k])
+        M = load_record(W.frames, S.terms.M[k])
         par = row_parameters(S.term_parameters, k)
         s = foot(par, F, M, z[S.terms.hint[k]], S.const)
         dz[S.terms.hint[k]] = progress(par, F, M, s, S.const)[0]
@@ -45,8 +45,8 @@ def curve_place_rates(S, W, z, dz, kind, foot, progress):
 def remember_turns(S, W, z):
     """Set the states that count turns to the values given by the poses in W."""
     for k in range(S.angles.F.shape[0]):
-        F = load_record(W.FK, S.angles.F[k])
-        M = load_record(W.FK, S.angles.M[k])
+        F = load_record(W.frames, S.angles.F[k])
+        M = load_record(W.frames, S.angles.M[k])
         h = S.angles.state[k]
         z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
 
@@ -55,8 +55,8 @@ def remember_turns(S, W, z):
 def remember_places(S, W, z, kind, foot):
     """Set the states that hold the places of a kind's terms on their curves to those given by the poses in W."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-        F = load_record(W.FK, S.terms.F[k])
-        M = load_record(W.FK, S.terms.M[k])
+        F = load_record(W.frames, S.terms.F[k])
+        M = load_record(W.frames, S.terms.M[k])
         h = S.terms.hint[k]
         z[h] = foot(row_parameters(S.term_parameters, k), F, M, z[h], S.const)
 

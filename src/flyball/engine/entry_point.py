@@ -18,7 +18,7 @@ import numpy as np
 
 from ..compiler.formulas import call, formula
 from ..compiler.kernels import PooledBuffer, StructBuffer, StructPool, kernel
-from ..compiler.struct_layout import Float1, Float2, Float3
+from ..compiler.struct_layout import Float1, Float2, Float3, Record
 from ..laws.bytecode import STACK_RESERVE
 from ..numerics.integrators.butcher_tableaux import Tableau, tableau
 from ..numerics.integrators.explicit_runge_kutta import run_explicit_task
@@ -38,14 +38,22 @@ from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (
     FLAT,
     SCRATCH,
+    ArticulatedBodies,
+    CompositeBodies,
     Counts,
+    FactorVectors,
+    KinematicRecords,
     Modes,
     Options,
+    Pivots,
     RowScratch,
     Sensed,
     System,
+    TrialState,
+    Twists,
     VelocityScratch,
     Work,
+    Wrenches,
 )
 from .calls import (
     ARRIVE,
@@ -115,7 +123,7 @@ def initialise_work(structure: Structure, system: System, array: Callable[[str],
         _, at_rest = structure.cache.get(
             "ground", id(frames), MAX_KEPT_LAYOUTS, lambda: (frames, ground_records(system))
         )
-        array("FK")[:n] = at_rest
+        array("frames")[:n] = at_rest
 
 
 def struct_tables(structure: Structure, system: System) -> StructBuffer:
@@ -130,17 +138,17 @@ def _new_struct_tables(structure: Structure, system: System) -> StructBuffer:
     return first.of(system)
 
 
-def ground_records(system: System) -> np.ndarray:
-    """Kinematic records of the frames on ground: the first rows of `Work.FK`, never written again."""
-    W = FrameRecords(np.zeros((system.sizes.ground_frames, 24), system.const.dtype))
+def ground_records(system: System) -> KinematicRecords:
+    """Kinematic records of the frames on ground: the first rows of `Work.frames`, never written again."""
+    W = FrameRecords(KinematicRecords.blank(system.sizes.ground_frames, dtype=system.const.dtype))
     store_ground_frames(system, W)
-    return W.FK
+    return W.frames
 
 
 class FrameRecords(NamedTuple):
     """Kinematic records of frames."""
 
-    FK: np.ndarray
+    frames: KinematicRecords
 
 
 def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
@@ -157,14 +165,19 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
 
+    def records(of: type[Record], count: int) -> Any:
+        return of.blank(count, dtype=dtype)
+
     return Work(
-        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
-        z(len(system.column)), z(len(system.column)),
-        z(len(structure.terms) if structure.loads or structure.sensed_columns else 0, 6),
+        records(KinematicRecords, nb), records(KinematicRecords, nf), records(Twists, nv), z(nb, 3),
+        records(Wrenches, nb), records(CompositeBodies, nb), records(ArticulatedBodies, nb), records(Pivots, nv),
+        z(len(system.mass_entries.row)), z(len(system.column)), z(len(system.column)),
+        records(Wrenches, len(structure.terms) if structure.loads or structure.sensed_columns else 0),
         RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
         z(Sensed.layout.width + nl, 2 * len(structure.measured) + nl + ne + nc + nw).view(Sensed),
         Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
-        z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(structure.depth + 1 + STACK_RESERVE, 3), z(3, ny),
+        z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), records(FactorVectors, n),
+        z(structure.depth + 1 + STACK_RESERVE, 3), records(TrialState, ny),
         Options.blank(), Counts.blank(),
         np.zeros(FLAT, np.int64), z(system.flat[SCRATCH]),
     )  # fmt: skip
@@ -210,8 +223,8 @@ def perform_task(S, W, R, clock, out, task):
         return status
     if task == RESIDUAL:
         for i in range(y.shape[0]):
-            W.y[0, i] = y[i]
-        residual(S, W, t, W.y[0], out[1], out[2], out[0])
+            W.trial.state[i] = y[i]
+        residual(S, W, t, W.trial.state, out[1], out[2], out[0])
         return 0
     if task == SOLVE:
         nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
@@ -338,7 +351,7 @@ def factor_square(S, W):
             W.A[S.pairs.place[e]] += W.H[i + k] * W.H[j + k]
     for k in range(S.rows.law.shape[0]):
         W.A[S.ldl.Ap[S.ldl.perm[k] + 1] - 1] += ADDED_DIAGONAL
-    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+    return ldl_factor(S.ldl, W.A, W.L, W.ldl.inverse_diagonal, W.ldl.scratch)
 
 
 @formula
@@ -359,7 +372,15 @@ def dependencies_at_states(address, S, W, R, clock, output, states, scale, block
         out[n, 0] = largest_singular_value(S.row_start, S.column, W.H, block[last + 1], W.velocities.scratch_1)
         X = block[: last + 1]
         out[n, 1], out[n, 2] = smallest_singular_values(
-            S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.velocities.scratch_1, W.D[2]
+            S.ldl,
+            W.L,
+            W.ldl.inverse_diagonal,
+            S.row_start,
+            S.column,
+            W.H,
+            X,
+            W.velocities.scratch_1,
+            W.ldl.right_hand_side,
         )
         for i in range(last):
             for k in range(S.rows.law.shape[0]):

@@ -145,8 +145,8 @@ def stabilised_residual(t, k, A, K, c):
                 i = S.column[e]
                 out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
     for n in range(K.tol_x.shape[0]):
-        out[2 * nv + 2 * nr + n] = K.xd[k, n] - W.y[1, n]
-        bad += W.y[1, n] - W.y[1, n]
+        out[2 * nv + 2 * nr + n] = K.xd[k, n] - W.trial.rate[n]
+        bad += W.trial.rate[n] - W.trial.rate[n]
     return 0 if bad == 0.0 and not turned_too_far(P, K.d[k]) else 1
 
 
@@ -178,11 +178,11 @@ def integral_rates(A, K, k):
     S, W = A[S_], A[W_]
     rate = K.rate[k]
     for n in range(S.control_laws.shape[0]):
-        rate[n] = W.y[1, n]
+        rate[n] = W.trial.rate[n]
     for f in range(S.forces.F.shape[0]):
         i = S.forces.work[f]
         if i >= 0:
-            rate[i] = W.y[1, i]
+            rate[i] = W.trial.rate[i]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
             rate[S.rows.work[r]] = K.lam[k, r] * W.rows.nu[r]

@@ -46,32 +46,49 @@ from ..math.vec import (
 )
 from ..tables.forest import TreeJoint
 from ..tables.reference_configuration import GROUND_STATE, BodyState, free_velocities, whole_turns
-from ..tables.table_definitions import FREE, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL, WELD, Bodies, Tree
+from ..tables.table_definitions import (
+    FREE,
+    PLANAR,
+    POINT,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    WELD,
+    Bodies,
+    KinematicRecords,
+    Tree,
+    Twists,
+)
 from ..tables.values import Values
-
-RECORD_WIDTH = 24
 
 
 @formula
 def load_record(K, k):
-    """Record k of a table."""
-    return load3(K, k, 0), load9(K, k, 3), load3(K, k, 12), load3(K, k, 15), load3(K, k, 18), load3(K, k, 21)
+    """Record k of `KinematicRecords`."""
+    return (
+        load3(K.position, k, 0),
+        load9(K.rotation, k, 0),
+        load3(K.angular_velocity, k, 0),
+        load3(K.velocity, k, 0),
+        load3(K.bias_angular_acceleration, k, 0),
+        load3(K.bias_acceleration, k, 0),
+    )
 
 
 @formula
 def store_pose(K, k, p, R):
     """Write position and rotation of record k."""
-    store3(K, k, 0, p)
-    store9(K, k, 3, R)
+    store3(K.position, k, 0, p)
+    store9(K.rotation, k, 0, R)
 
 
 @formula
 def store_motion(K, k, w, v, alpha, a):
     """Write velocities and bias accelerations of record k."""
-    store3(K, k, 12, w)
-    store3(K, k, 15, v)
-    store3(K, k, 18, alpha)
-    store3(K, k, 21, a)
+    store3(K.angular_velocity, k, 0, w)
+    store3(K.velocity, k, 0, v)
+    store3(K.bias_angular_acceleration, k, 0, alpha)
+    store3(K.bias_acceleration, k, 0, a)
 
 
 @formula
@@ -101,15 +118,15 @@ def body_pose(S, W, b, q):
         s = sin(q[q0 + 2])
         o = 0.0 * c
         p = (q[q0], q[q0 + 1], o)
-        store_pose(W.BK, b, p, (c, -s, o, s, c, o, o, o, o + 1.0))
+        store_pose(W.bodies, b, p, (c, -s, o, s, c, o, o, o, o + 1.0))
         store3(W.O, b, 0, p)
     elif kind == FREE:
         p = (q[q0], q[q0 + 1], q[q0 + 2])
-        store_pose(W.BK, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
+        store_pose(W.bodies, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
         store3(W.O, b, 0, p)
     elif kind == POINT:
         p = (q[q0], q[q0 + 1], q[q0 + 2] if S.tree.nv[b] == 3 else 0.0 * q[q0])
-        store_pose(W.BK, b, p, load9(S.bodies.body_rotation, b, 0))
+        store_pose(W.bodies, b, p, load9(S.bodies.body_rotation, b, 0))
         store3(W.O, b, 0, p)
     else:
         joint_pose(S, W, b, kind, q, q0)
@@ -122,26 +139,26 @@ def joint_pose(S, W, b, kind, q, q0):
     p = load3(S.bodies.joint_position, b, 0)
     R = load9(S.bodies.joint_rotation, b, 0)
     if parent >= 0:
-        A = load9(W.BK, parent, 3)
-        p = add(load3(W.BK, parent, 0), mv(A, p))
+        A = load9(W.bodies.rotation, parent, 0)
+        p = add(load3(W.bodies.position, parent, 0), mv(A, p))
         R = mm(A, R) if S.bodies.joint_turned[b] != 0.0 else A
     v0 = S.tree.v[b]
     axis = col(R, 2)
     if kind == REVOLUTE:
-        store3(W.X, v0, 0, axis)
+        store3(W.twists.angular, v0, 0, axis)
         R = rotated_about_z(R, cos(q[q0]), sin(q[q0]))
     elif kind == PRISMATIC:
-        store3(W.X, v0, 3, axis)
+        store3(W.twists.linear, v0, 0, axis)
         p = add(p, scale(q[q0], axis))
     elif kind == SPHERICAL:
         R = mm(R, quaternion_matrix(q[q0], q[q0 + 1], q[q0 + 2], q[q0 + 3]))
         for i in range(3):
-            store3(W.X, v0 + i, 0, (R[i], R[3 + i], R[6 + i]))
+            store3(W.twists.angular, v0 + i, 0, (R[i], R[3 + i], R[6 + i]))
     store3(W.O, b, 0, p)
     p = add(p, mv(R, load3(S.bodies.body_position, b, 0)))
     if S.bodies.body_turned[b] != 0.0:
         R = mm(R, load9(S.bodies.body_rotation, b, 0))
-    store_pose(W.BK, b, p, R)
+    store_pose(W.bodies, b, p, R)
 
 
 @formula
@@ -168,16 +185,16 @@ def body_motion(S, W, b, v):
     if kind == PLANAR:
         o = 0.0 * v[v0]
         zero = (o, o, o)
-        store_motion(W.BK, b, (o, o, v[v0 + 2]), (v[v0], v[v0 + 1], o), zero, zero)
+        store_motion(W.bodies, b, (o, o, v[v0 + 2]), (v[v0], v[v0 + 1], o), zero, zero)
     elif kind == FREE:
         o = 0.0 * v[v0]
         zero = (o, o, o)
-        w = mv(load9(W.BK, b, 3), (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
-        store_motion(W.BK, b, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero)
+        w = mv(load9(W.bodies.rotation, b, 0), (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
+        store_motion(W.bodies, b, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero)
     elif kind == POINT:
         o = 0.0 * v[v0]
         zero = (o, o, o)
-        store_motion(W.BK, b, zero, (v[v0], v[v0 + 1], v[v0 + 2] if S.tree.nv[b] == 3 else o), zero, zero)
+        store_motion(W.bodies, b, zero, (v[v0], v[v0 + 1], v[v0 + 2] if S.tree.nv[b] == 3 else o), zero, zero)
     else:
         joint_motion(S, W, b, kind, v, v0)
 
@@ -186,48 +203,49 @@ def body_motion(S, W, b, v):
 def joint_motion(S, W, b, kind, v, v0):
     """The same for the other kinds: parent's motion at the reference point, plus the joint's, then to the body."""
     parent = S.tree.parent[b]
-    o = 0.0 * W.BK[b, 0]
+    o = 0.0 * W.bodies.position[b, 0]
     w = (o, o, o)
     u = w
     alpha = w
     a = w
     P = load3(W.O, b, 0)
     if parent >= 0:
-        p, _, w, u, alpha, a = load_record(W.BK, parent)
+        p, _, w, u, alpha, a = load_record(W.bodies, parent)
         r = sub(P, p)
         wr = cross(w, r)
         u = add(u, wr)
         a = add(a, add(cross(alpha, r), cross(w, wr)))
     if kind == PRISMATIC:
-        slide = scale(v[v0], load3(W.X, v0, 3))
+        slide = scale(v[v0], load3(W.twists.linear, v0, 0))
         u = add(u, slide)
         a = add(a, scale(2.0, cross(w, slide)))
     elif kind != WELD:
-        spin = scale(v[v0], load3(W.X, v0, 0))
+        spin = scale(v[v0], load3(W.twists.angular, v0, 0))
         if kind == SPHERICAL:
-            spin = add(spin, add(scale(v[v0 + 1], load3(W.X, v0 + 1, 0)), scale(v[v0 + 2], load3(W.X, v0 + 2, 0))))
+            y, z = load3(W.twists.angular, v0 + 1, 0), load3(W.twists.angular, v0 + 2, 0)
+            spin = add(spin, add(scale(v[v0 + 1], y), scale(v[v0 + 2], z)))
         alpha = add(alpha, cross(w, spin))
         w = add(w, spin)
-    r = sub(load3(W.BK, b, 0), P)
+    r = sub(load3(W.bodies.position, b, 0), P)
     wr = cross(w, r)
-    store_motion(W.BK, b, w, add(u, wr), alpha, add(a, add(cross(alpha, r), cross(w, wr))))
+    store_motion(W.bodies, b, w, add(u, wr), alpha, add(a, add(cross(alpha, r), cross(w, wr))))
 
 
 @formula
 def twist_column(S, W, b, k):
     """World twist of body b per unit of its k-th own velocity: (angular velocity, velocity of the reference point)."""
     kind = S.tree.joint[b]
-    o = 0.0 * W.BK[b, 0]
+    o = 0.0 * W.bodies.position[b, 0]
     l = o + 1.0
     zero = (o, o, o)
     if kind == REVOLUTE or kind == SPHERICAL:
-        return load3(W.X, S.tree.v[b] + k, 0), zero
+        return load3(W.twists.angular, S.tree.v[b] + k, 0), zero
     if kind == PRISMATIC:
-        return zero, load3(W.X, S.tree.v[b], 3)
+        return zero, load3(W.twists.linear, S.tree.v[b], 0)
     if kind == PLANAR and k == 2:
         return (o, o, l), zero
     if kind == FREE and k >= 3:
-        return (W.BK[b, k], W.BK[b, 3 + k], W.BK[b, 6 + k]), zero
+        return col(load9(W.bodies.rotation, b, 0), k - 3), zero
     if k == 0:
         return zero, (l, o, o)
     if k == 1:
@@ -243,7 +261,7 @@ def project_wrench(S, W, b, out, at, sign, force, torque, point):
     """
     kind = S.tree.joint[b]
     if kind == PRISMATIC:
-        out[at] += sign * dot(load3(W.X, S.tree.v[b], 3), force)
+        out[at] += sign * dot(load3(W.twists.linear, S.tree.v[b], 0), force)
         return
     if kind == POINT:
         for i in range(S.tree.nv[b]):
@@ -255,7 +273,7 @@ def project_wrench(S, W, b, out, at, sign, force, torque, point):
         out[at + 1] += sign * force[1]
         out[at + 2] += sign * t[2]
     elif kind == FREE:
-        m = mtv(load9(W.BK, b, 3), t)
+        m = mtv(load9(W.bodies.rotation, b, 0), t)
         out[at] += sign * force[0]
         out[at + 1] += sign * force[1]
         out[at + 2] += sign * force[2]
@@ -263,10 +281,10 @@ def project_wrench(S, W, b, out, at, sign, force, torque, point):
         out[at + 4] += sign * m[1]
         out[at + 5] += sign * m[2]
     elif kind == REVOLUTE:
-        out[at] += sign * dot(load3(W.X, S.tree.v[b], 0), t)
+        out[at] += sign * dot(load3(W.twists.angular, S.tree.v[b], 0), t)
     elif kind == SPHERICAL:
         for i in range(3):
-            out[at + i] += sign * dot(load3(W.X, S.tree.v[b] + i, 0), t)
+            out[at + i] += sign * dot(load3(W.twists.angular, S.tree.v[b] + i, 0), t)
 
 
 @formula
@@ -354,9 +372,9 @@ def update_poses(S, W, q):
         body_pose(S, W, b, q)
     for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         p, R, _, _, _, _ = attached_record(
-            load_record(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            load_record(W.bodies, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
-        store_pose(W.FK, k, p, R)
+        store_pose(W.frames, k, p, R)
 
 
 @formula
@@ -372,9 +390,9 @@ def update_frame_motions(S, W):
     """Velocities and bias accelerations of the frames, from their bodies'."""
     for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         _, _, w, u, alpha, a = attached_record(
-            load_record(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            load_record(W.bodies, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
-        store_motion(W.FK, k, w, u, alpha, a)
+        store_motion(W.frames, k, w, u, alpha, a)
 
 
 @formula
@@ -382,10 +400,10 @@ def update_frames(S, W):
     """Poses and motions of the frames in one pass."""
     for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         p, R, w, u, alpha, a = attached_record(
-            load_record(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            load_record(W.bodies, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
-        store_pose(W.FK, k, p, R)
-        store_motion(W.FK, k, w, u, alpha, a)
+        store_pose(W.frames, k, p, R)
+        store_motion(W.frames, k, w, u, alpha, a)
 
 
 @formula
@@ -395,8 +413,8 @@ def store_ground_frames(S, W):
         p, R, w, v, alpha, a = stationary_record(
             load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0), 0.0 * S.frames.position[k, 0]
         )
-        store_pose(W.FK, k, p, R)
-        store_motion(W.FK, k, w, v, alpha, a)
+        store_pose(W.frames, k, p, R)
+        store_motion(W.frames, k, w, v, alpha, a)
 
 
 class BodyTables(NamedTuple):
@@ -407,18 +425,18 @@ class BodyTables(NamedTuple):
 
 
 class BodyKinematics(NamedTuple):
-    """Kinematics of the bodies at one state, as in `Work`: records, twist columns, reference points."""
+    """Kinematics of the bodies at one state, as in `Work`."""
 
-    BK: Float2
-    X: Float2
+    bodies: KinematicRecords
+    twists: Twists
     O: Float2
 
 
 class BodyKinematicsOverTime(NamedTuple):
     """The same at all states, (bodies or columns, numbers, states)."""
 
-    BK: Float3
-    X: Float3
+    bodies: Float3  # in Python with the same names
+    twists: Float3
     O: Float3
 
 
@@ -429,13 +447,13 @@ def kinematics_over_time(S: BodyTables, W: BodyKinematics, q: Float2, v: Float2,
         for b in range(S.tree.parent.shape[0]):
             body_pose(S, W, b, q[i])
             body_motion(S, W, b, v[i])
-            for k in range(24):
-                out.BK[b, k, i] = W.BK[b, k]
+            for k in range(W.bodies.shape[1]):
+                out.bodies[b, k, i] = W.bodies[b, k]
             for k in range(3):
                 out.O[b, k, i] = W.O[b, k]
         for j in range(v.shape[1]):
-            for k in range(6):
-                out.X[j, k, i] = W.X[j, k]
+            for k in range(W.twists.shape[1]):
+                out.twists[j, k, i] = W.twists[j, k]
     return 0
 
 
@@ -472,7 +490,7 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
         if b >= 0 and S.tree.joint[b] == PLANAR:
             out[name] = q[S.tree.q[b] + 2]
         elif b >= 0:
-            near, angle = x.bodies[name].angle + since[b], atan2(W.BK[b, 6], W.BK[b, 3])
+            near, angle = x.bodies[name].angle + since[b], atan2(W.bodies.rotation[b, 3], W.bodies.rotation[b, 0])
             out[name] = angle + whole_turns(near, angle)
     return out
 

@@ -173,10 +173,12 @@ def inertial_wrenches(S, W):
     """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
     gravity = (S.gravity[0], S.gravity[1], S.gravity[2])
     for b in range(S.tree.parent.shape[0]):
-        store3(W.FB, b, 0, scale(S.bodies.mass[b], sub(gravity, load3(W.BK, b, 21))))
-        R = load9(W.BK, b, 3)
-        t = euler_moment(load9(S.bodies.inertia, b, 0), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
-        store3(W.FB, b, 3, neg(mv(R, t)))
+        a = load3(W.bodies.bias_acceleration, b, 0)
+        store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))
+        R = load9(W.bodies.rotation, b, 0)
+        w, alpha = load3(W.bodies.angular_velocity, b, 0), load3(W.bodies.bias_angular_acceleration, b, 0)
+        t = euler_moment(load9(S.bodies.inertia, b, 0), mtv(R, w), mtv(R, alpha))
+        store3(W.body_wrenches.torque, b, 0, neg(mv(R, t)))
 
 
 @formula
@@ -194,10 +196,10 @@ def euler_moment(I, w, alpha):
 @formula
 def apply_wrench(W, b, sign, force, torque, point):
     """Add ``sign`` times a wrench about ``point`` to body b."""
-    t = add(torque, cross(sub(point, load3(W.BK, b, 0)), force))
+    t = add(torque, cross(sub(point, load3(W.bodies.position, b, 0)), force))
     for i in range(3):
-        W.FB[b, i] += sign * force[i]
-        W.FB[b, 3 + i] += sign * t[i]
+        W.body_wrenches.force[b, i] += sign * force[i]
+        W.body_wrenches.torque[b, i] += sign * t[i]
 
 
 @formula
@@ -236,8 +238,8 @@ def force_row(T, k):
 def wrench_between_frames(S, W, t, k):
     """Records of frames F and M of force k between frames, and its wrench on M about M's origin."""
     kind = force_kind(S, k)
-    F = load_record(W.FK, S.forces.F[k])
-    M = load_record(W.FK, S.forces.M[k])
+    F = load_record(W.frames, S.forces.F[k])
+    M = load_record(W.frames, S.forces.M[k])
     par = force_row(S.force_parameters, k)
     a, b = inputs(kind, par, F, M)
     x = (t + 0.0 * a, a, b)
@@ -323,9 +325,9 @@ def gather_forces(S, W, f):
     for d in range(f.shape[0]):
         f[d] = 0.0
     for b in range(S.tree.parent.shape[0] - 1, -1, -1):
-        force = load3(W.FB, b, 0)
-        torque = load3(W.FB, b, 3)
-        point = load3(W.BK, b, 0)
+        force = load3(W.body_wrenches.force, b, 0)
+        torque = load3(W.body_wrenches.torque, b, 0)
+        point = load3(W.bodies.position, b, 0)
         if S.tree.nv[b] > 0:
             project_wrench(S, W, b, f, S.tree.v[b], 1.0, force, torque, point)
         if S.tree.parent[b] >= 0:
@@ -371,7 +373,7 @@ def reaction_loads(S, W):
                 f, m = wrench_on_second(S, W, S.load_terms.term[x])
                 force, torque = add(force, f), add(torque, m)
         W.sensed.returned[n] = pressed(
-            force_row(S.force_parameters, k), load_record(W.FK, S.forces.M[k]), force, torque
+            force_row(S.force_parameters, k), load_record(W.frames, S.forces.M[k]), force, torque
         )
 
 

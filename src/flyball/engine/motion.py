@@ -330,7 +330,7 @@ def finite_status(dy):
 def derivative(t, y, dy, S, W):
     """dy/dt = f(P(y)) with the projection P; ``y`` is not changed. Returns 0 or a status."""
     nq = S.sizes.coordinates
-    p = W.y[0]
+    p = W.trial.state
     for i in range(y.shape[0]):
         p[i] = y[i]
     q = p[:nq]
@@ -390,7 +390,7 @@ def report_state(t, y, out, S, W):
     Where accelerations are deferred, vdot and lam are not written.
     """
     W.options.placed = W.options.deferred
-    status, _ = project_and_evaluate(t, y, W.y[1], S, W)
+    status, _ = project_and_evaluate(t, y, W.trial.rate, S, W)
     W.options.placed = 0.0
     write_row(t, y, out, S, W)
     return status

@@ -136,8 +136,8 @@ def store_law_inputs(S, W, buffer, row):
         if S.forces.family[f] == ALONG:
             a, b = W.sensed.value[S.forces.F[f]], W.sensed.rate[S.forces.F[f]]
         else:
-            F = load_record(W.FK, S.forces.F[f])
-            M = load_record(W.FK, S.forces.M[f])
+            F = load_record(W.frames, S.forces.F[f])
+            M = load_record(W.frames, S.forces.M[f])
             a, b = inputs(force_kind(S, f), force_row(S.force_parameters, f), F, M)
             if S.forces.family[f] == BETWEEN and breaks(force_kind(S, f)):
                 side = branch(force_kind(S, f), force_row(S.force_parameters, f), F, M)

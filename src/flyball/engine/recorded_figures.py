@@ -55,8 +55,8 @@ def record_energies(S, W, out, n):
     """Record the energies of all bodies and forces at the state in W."""
     gravity = (S.gravity[0], S.gravity[1], S.gravity[2])
     for b in range(S.tree.parent.shape[0]):
-        p, v, m = load3(W.BK, b, 0), load3(W.BK, b, 15), S.bodies.mass[b]
-        w = mtv(load9(W.BK, b, 3), load3(W.BK, b, 12))
+        p, v, m = load3(W.bodies.position, b, 0), load3(W.bodies.velocity, b, 0), S.bodies.mass[b]
+        w = mtv(load9(W.bodies.rotation, b, 0), load3(W.bodies.angular_velocity, b, 0))
         out.kinetic[n, b] = 0.5 * (m * dot(v, v) + dot(w, mv(load9(S.bodies.inertia, b, 0), w)))
         out.gravity[n, b] = -m * dot(gravity, p)
         out.speed[n, b] = norm(v)
@@ -68,7 +68,7 @@ def record_energies(S, W, out, n):
         if S.force_code[k] != 0:
             out.elastic[n, k] = nan
         elif S.forces.family[k] == BETWEEN:
-            F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
+            F, M = load_record(W.frames, S.forces.F[k]), load_record(W.frames, S.forces.M[k])
             out.elastic[n, k] = energy_between(kind, par, F, M)
         elif S.forces.family[k] == ALONG:
             out.elastic[n, k] = energy_along(kind, par, W.sensed.value[S.forces.F[k]])
@@ -76,27 +76,29 @@ def record_energies(S, W, out, n):
 
 @formula
 def record_gain(S, W, x, out, n):
-    """Record the kinetic energy that accelerations x would give bodies at rest; true accelerations go to `Work.FB`.
+    """Record the kinetic energy that accelerations x would give bodies at rest; what they add to the
+    bias accelerations goes to `Work.body_wrenches`.
 
     Returns the largest of these accelerations and gravity: [1/s^2], lengths by the mechanism's length.
     """
     largest = norm((S.gravity[0], S.gravity[1], S.gravity[2])) / S.scales.length
     for b in range(S.tree.parent.shape[0]):
         o = 0.0 * S.bodies.mass[b]
-        p, parent = load3(W.BK, b, 0), S.tree.parent[b]
+        p, parent = load3(W.bodies.position, b, 0), S.tree.parent[b]
         alpha = a = (o, o, o)  # beyond the bias accelerations
         if parent >= 0:
-            alpha = load3(W.FB, parent, 0)
-            a = add(load3(W.FB, parent, 3), cross(alpha, sub(p, load3(W.BK, parent, 0))))
+            alpha = load3(W.body_wrenches.angular_acceleration, parent, 0)
+            a = load3(W.body_wrenches.acceleration, parent, 0)
+            a = add(a, cross(alpha, sub(p, load3(W.bodies.position, parent, 0))))
         arm = sub(p, load3(W.O, b, 0))
         for i in range(S.tree.nv[b]):
             turn, shift = twist_column(S, W, b, i)
             alpha = add(alpha, scale(x[S.tree.v[b] + i], turn))
             a = add(a, scale(x[S.tree.v[b] + i], add(shift, cross(turn, arm))))
-        store3(W.FB, b, 0, alpha)
-        store3(W.FB, b, 3, a)
-        a = add(a, load3(W.BK, b, 21))
-        alpha = mtv(load9(W.BK, b, 3), add(alpha, load3(W.BK, b, 18)))
+        store3(W.body_wrenches.angular_acceleration, b, 0, alpha)
+        store3(W.body_wrenches.acceleration, b, 0, a)
+        a = add(a, load3(W.bodies.bias_acceleration, b, 0))
+        alpha = mtv(load9(W.bodies.rotation, b, 0), add(alpha, load3(W.bodies.bias_angular_acceleration, b, 0)))
         out.gain[n, b] = 0.5 * (S.bodies.mass[b] * dot(a, a) + dot(alpha, mv(load9(S.bodies.inertia, b, 0), alpha)))
         largest = max(largest, norm(a) / S.scales.length, norm(alpha))
     return largest

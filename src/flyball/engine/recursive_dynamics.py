@@ -28,7 +28,7 @@ import numpy as np
 from ..compiler.formulas import formula
 from ..compiler.struct_layout import Float1, Float2, Int1
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, scale, store3, store9, sub, symmetric
-from ..tables.table_definitions import FREE, PLANAR, POINT, Tree
+from ..tables.table_definitions import FREE, PLANAR, POINT, CompositeBodies, Tree
 from .articulated_body import (
     add_symmetric,
     body_inertia,
@@ -56,7 +56,7 @@ class TreeDynamics(NamedTuple):
     velocity: Float2  # (nb, 6)
     acceleration: Float2  # (nb, 6): includes that of gravity, upwards
     force: Float2  # (nb, 6): of a body; after the inward pass of its subtree
-    inertia: Float2  # (nb, 10): mass, first moment, inertia; after the inward pass of its subtree
+    composites: CompositeBodies  # (nb,): each subtree about the reference point of its root
     coriolis: Float2  # (nb, 12): N and l of the module's docstring; after the inward pass of its subtree
     column: Float2  # (nv, 6): twist per unit of each velocity
     psi: Float2  # (nv, 6)
@@ -90,8 +90,8 @@ def tree_dynamics(bodies: int, coordinates: int, velocities: int, dtype: Any = f
         return np.zeros(shape, dtype)
 
     return TreeDynamics(
-        z(nb, 3), z(nb, 6), z(nb, 6), z(nb, 6), z(nb, 10), z(nb, 12), z(nv, 6), z(nv, 6), z(nv, 6), z(nv, 6),
-        z(nv, nv), z(3, nv), z(coordinates),
+        z(nb, 3), z(nb, 6), z(nb, 6), z(nb, 6), CompositeBodies.blank(nb, dtype=dtype), z(nb, 12), z(nv, 6), z(nv, 6),
+        z(nv, 6), z(nv, 6), z(nv, nv), z(3, nv), z(coordinates),
     )  # fmt: skip
 
 
@@ -148,7 +148,8 @@ def inertia_times(I, a):
 @formula
 def load_inertia(D, b):
     """Mass, first moment and inertia stored for body b."""
-    return D.inertia[b, 0], load3(D.inertia, b, 1), load_symmetric(D.inertia, b, 4)
+    I = D.composites
+    return I.mass[b], load3(I.first_moment, b, 0), load_symmetric(I.inertia, b)
 
 
 @formula
@@ -213,7 +214,7 @@ def move_bodies(S, V, D, v):
 @formula
 def inertial_force(S, W, D, b):
     """Force that the motion of body b needs, by Newton's and Euler's laws about its centre of mass."""
-    R, r = load9(W.BK, b, 3), sub(load3(W.BK, b, 0), load3(D.point, b, 0))
+    R, r = load9(W.bodies.rotation, b, 0), sub(load3(W.bodies.position, b, 0), load3(D.point, b, 0))
     (w, u), (alpha, a) = load6(D.velocity, b), load6(D.acceleration, b)
     a = add(a, add(cross(alpha, r), cross(w, add(u, cross(w, r)))))
     force = scale(S.bodies.mass[b], a)
@@ -261,19 +262,19 @@ def forward_dynamics(S, W, V, D, v, tau, vdot):
 @formula
 def composite_inertias(S, W, D):
     """Inertia of every subtree about the reference point of its tree."""
+    I = D.composites
     n = S.tree.parent.shape[0]
     for b in range(n):
         m, h, J = body_inertia(S, W, b, load3(D.point, b, 0))
-        D.inertia[b, 0] = m
-        store3(D.inertia, b, 1, h)
-        store_symmetric(D.inertia, b, 4, J)
+        I.mass[b] = m
+        store3(I.first_moment, b, 0, h)
+        store_symmetric(I.inertia, b, J)
     for b in range(n - 1, -1, -1):
         a = S.tree.parent[b]
         if a >= 0:
-            D.inertia[a, 0] += D.inertia[b, 0]
-            store3(D.inertia, a, 1, add(load3(D.inertia, a, 1), load3(D.inertia, b, 1)))
-            J = add_symmetric(load_symmetric(D.inertia, a, 4), load_symmetric(D.inertia, b, 4))
-            store_symmetric(D.inertia, a, 4, J)
+            I.mass[a] += I.mass[b]
+            store3(I.first_moment, a, 0, add(load3(I.first_moment, a, 0), load3(I.first_moment, b, 0)))
+            store_symmetric(I.inertia, a, add_symmetric(load_symmetric(I.inertia, a), load_symmetric(I.inertia, b)))
 
 
 @formula
@@ -519,7 +520,7 @@ def frame_jacobian(S, W, V, D, b, offset, out):
     d = last_velocity(S, b)
     if d < 0:
         return
-    r = sub(add(load3(W.BK, b, 0), mv(load9(W.BK, b, 3), offset)), load3(D.point, b, 0))
+    r = sub(add(load3(W.bodies.position, b, 0), mv(load9(W.bodies.rotation, b, 0), offset)), load3(D.point, b, 0))
     while d >= 0:
         w, u = load6(D.column, d)
         u = add(u, cross(w, r))
@@ -536,7 +537,7 @@ def frame_jacobian_rate(S, W, V, D, b, offset, out):
     d = last_velocity(S, b)
     if d < 0:
         return
-    r = sub(add(load3(W.BK, b, 0), mv(load9(W.BK, b, 3), offset)), load3(D.point, b, 0))
+    r = sub(add(load3(W.bodies.position, b, 0), mv(load9(W.bodies.rotation, b, 0), offset)), load3(D.point, b, 0))
     spin, shift = load6(D.velocity, b)
     moves = add(shift, cross(spin, r))
     while d >= 0:

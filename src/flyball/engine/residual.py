@@ -75,7 +75,8 @@ def inertial_terms(S, W, out):
     inertial_wrenches(S, W)
     at = 0
     for b in range(S.tree.parent.shape[0]):
-        at = wrench_terms(S, W, b, out, at, -1.0, load3(W.FB, b, 0), load3(W.FB, b, 3), load3(W.BK, b, 0))
+        force, torque = load3(W.body_wrenches.force, b, 0), load3(W.body_wrenches.torque, b, 0)
+        at = wrench_terms(S, W, b, out, at, -1.0, force, torque, load3(W.bodies.position, b, 0))
     return at
 
 
@@ -168,8 +169,8 @@ def wrench_slopes(S, W, t, k, out):
     """Stiffness and damping of force k between frames, by central differences of the pose and motion of M."""
     kind = force_kind(S, k)
     par = force_row(S.force_parameters, k)
-    F = load_record(W.FK, S.forces.F[k])
-    p, R, w, v, alpha, a = load_record(W.FK, S.forces.M[k])
+    F = load_record(W.frames, S.forces.F[k])
+    p, R, w, v, alpha, a = load_record(W.frames, S.forces.M[k])
     speed = S.scales.length * W.options.rate + norm(sub(v, F[3]))
     n = int(out[k, DIRECTIONS])
     for j in range(4 * n):
@@ -228,7 +229,7 @@ def residuals(S, W, bench, task):
     known = nv + 3 * nr + 3 * count_measured(S)
     behind = known + bench.steps.shape[1] - (3 * nv + 1)
     a = W.velocities.scratch_2
-    p = W.y[0]
+    p = W.trial.state
     for n in range(bench.steps.shape[0]):
         t = bench.t[0] + bench.steps[n, 3 * nv]
         for i in range(p.shape[0]):
@@ -262,7 +263,7 @@ def residuals(S, W, bench, task):
             else:
                 store_residual(S, W, t, p, bench.lam, bench.out[n])
             for c in range(known, behind):
-                bench.out[n, c] = -W.y[1, c - known]
+                bench.out[n, c] = -W.trial.rate[c - known]
     return 0
 
 
@@ -312,9 +313,9 @@ def store_residual(S, W, t, p, lam, out):
     f = W.velocities.applied
     apply_multipliers(S, W, t, p, lam)
     inertial_wrenches(S, W)
-    apply_forces(S, W, t, W.y[1])
+    apply_forces(S, W, t, W.trial.rate)
     gather_forces(S, W, f)
-    apply_efforts(S, W, t, W.y[1], f)
+    apply_efforts(S, W, t, W.trial.rate, f)
     for d in range(nv):
         out[d] = -f[d]
     for k in range(nr):
@@ -341,7 +342,7 @@ def apply_multipliers(S, W, t, p, lam):
     reaction_loads(S, W)
     for n in range(2 * count_measured(S), loads_end(S, W)):
         W.sensed.load[n] = W.sensed.returned[n]
-    update_controllers(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], W.y[1])
+    update_controllers(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], W.trial.rate)
 
 
 @formula
@@ -350,23 +351,23 @@ def accelerated_motion(S, W, b, v, vdot):
     body_motion(S, W, b, v)
     kind = S.tree.joint[b]
     v0 = S.tree.v[b]
-    alpha = load3(W.BK, b, 18)
-    a = load3(W.BK, b, 21)
+    alpha = load3(W.bodies.bias_angular_acceleration, b, 0)
+    a = load3(W.bodies.bias_acceleration, b, 0)
     if kind == PLANAR:
         a = add(a, (vdot[v0], vdot[v0 + 1], 0.0 * vdot[v0]))
         alpha = add(alpha, (0.0 * vdot[v0], 0.0 * vdot[v0], vdot[v0 + 2]))
     elif kind == FREE:
         a = add(a, (vdot[v0], vdot[v0 + 1], vdot[v0 + 2]))
-        alpha = add(alpha, mv(load9(W.BK, b, 3), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
+        alpha = add(alpha, mv(load9(W.bodies.rotation, b, 0), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
     else:
-        arm = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
+        arm = sub(load3(W.bodies.position, b, 0), load3(W.O, b, 0))
         for k in range(S.tree.nv[b]):
             x, u = twist_column(S, W, b, k)
             turn = scale(vdot[v0 + k], x)
             alpha = add(alpha, turn)
             a = add(a, add(scale(vdot[v0 + k], u), cross(turn, arm)))
-    store3(W.BK, b, 18, alpha)
-    store3(W.BK, b, 21, a)
+    store3(W.bodies.angular_acceleration, b, 0, alpha)
+    store3(W.bodies.acceleration, b, 0, a)
 
 
 @first_order_kernel

@@ -42,7 +42,7 @@ def count_measured(S):
 def term_wrench(S, W, k):
     """Wrench (force, torque) of the multiplier of term k's row on its second body, about M's origin."""
     c = W.rows.multiplier[S.terms.row[k]] * S.term_parameters[k, COEFFICIENT]
-    return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
+    return scale(c, load3(W.term_wrenches.force, k, 0)), scale(c, load3(W.term_wrenches.torque, k, 0))
 
 
 @formula
@@ -52,7 +52,7 @@ def wrench_on_second(S, W, what):
     k = what if what < nt else what - nt
     force, torque = term_wrench(S, W, k)
     if what >= nt:  # seen from the other body, at the other frame: both reversed, about that frame's origin
-        arm = sub(load3(W.FK, S.terms.M[k], 0), load3(W.FK, S.terms.F[k], 0))
+        arm = sub(load3(W.frames.position, S.terms.M[k], 0), load3(W.frames.position, S.terms.F[k], 0))
         return neg(force), neg(add(torque, cross(arm, force)))
     return force, torque
 
@@ -85,9 +85,9 @@ def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
         W.rows.value[r] += c * g
     else:
         W.sensed.value[r - nr] += c * g
-    if W.T.shape[0] > 0:
-        store3(W.T, k, 0, force)
-        store3(W.T, k, 3, torque_M)
+    if W.term_wrenches.shape[0] > 0:
+        store3(W.term_wrenches.force, k, 0, force)
+        store3(W.term_wrenches.torque, k, 0, torque_M)
     for s in range(S.terms.segment[k], S.terms.segment_end[k]):
         if S.segments.side[s] > 0:
             project_wrench(S, W, S.segments.body[s], W.G, S.segments.entry[s], c, force, torque_M, from_M)
@@ -110,8 +110,8 @@ def add_bias(S, W, k, bias):
 def each_value(S, W, z, kind, row):
     """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-        F = load_record(W.FK, S.terms.F[k])
-        M = load_record(W.FK, S.terms.M[k])
+        F = load_record(W.frames, S.terms.F[k])
+        M = load_record(W.frames, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
         g, force, torque_M, torque_F, _ = row(row_parameters(S.term_parameters, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
@@ -121,8 +121,8 @@ def each_value(S, W, z, kind, row):
 def each_bias(S, W, z, kind, row):
     """Subtract the acceleration bias of every term of one kind from its row's gamma; add it for measured quantities."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-        F = load_record(W.FK, S.terms.F[k])
-        M = load_record(W.FK, S.terms.M[k])
+        F = load_record(W.frames, S.terms.F[k])
+        M = load_record(W.frames, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
         _, _, _, _, bias = row(row_parameters(S.term_parameters, k), F, M, hint, S.const)
         add_bias(S, W, k, bias)
@@ -132,8 +132,8 @@ def each_bias(S, W, z, kind, row):
 def each_row(S, W, z, whole, kind, row):
     """``each_value`` and ``each_bias`` in one; biases of measured quantities only if ``whole``."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-        F = load_record(W.FK, S.terms.F[k])
-        M = load_record(W.FK, S.terms.M[k])
+        F = load_record(W.frames, S.terms.F[k])
+        M = load_record(W.frames, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
         g, force, torque_M, torque_F, bias = row(row_parameters(S.term_parameters, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
@@ -155,8 +155,8 @@ def rare_values(S, W, z, first, last, row):
     """
     for kind in range(first, last):
         for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-            F = load_record(W.FK, S.terms.F[k])
-            M = load_record(W.FK, S.terms.M[k])
+            F = load_record(W.frames, S.terms.F[k])
+            M = load_record(W.frames, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
             g, force, torque_M, torque_F, _ = row(
                 row_kind(S, k, kind), row_parameters(S.term_parameters, k), F, M, hint, S.const
@@ -169,8 +169,8 @@ def rare_biases(S, W, z, first, last, row):
     """``each_bias`` for kinds that share one loop."""
     for kind in range(first, last):
         for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-            F = load_record(W.FK, S.terms.F[k])
-            M = load_record(W.FK, S.terms.M[k])
+            F = load_record(W.frames, S.terms.F[k])
+            M = load_record(W.frames, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
             _, _, _, _, bias = row(row_kind(S, k, kind), row_parameters(S.term_parameters, k), F, M, hint, S.const)
             add_bias(S, W, k, bias)
@@ -181,8 +181,8 @@ def rare_rows(S, W, z, first, last, row):
     """``each_row`` for kinds that share one loop, biases always."""
     for kind in range(first, last):
         for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
-            F = load_record(W.FK, S.terms.F[k])
-            M = load_record(W.FK, S.terms.M[k])
+            F = load_record(W.frames, S.terms.F[k])
+            M = load_record(W.frames, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
             g, force, torque_M, torque_F, bias = row(
                 row_kind(S, k, kind), row_parameters(S.term_parameters, k), F, M, hint, S.const

@@ -139,7 +139,7 @@ def factor_schur(S, W):
     for k in range(S.rows.law.shape[0]):
         place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
         W.A[place] += S.scales.regularization * W.rows.diagonal[k] + DIAGONAL_ROUNDING * W.A[place]
-    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+    return ldl_factor(S.ldl, W.A, W.L, W.ldl.inverse_diagonal, W.ldl.scratch)
 
 
 @formula
@@ -169,7 +169,7 @@ def factor_coupled(S, W):
         s = choose(s, s, s + 1.0)
         W.rows.diagonal[k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.scales.regularization * s
-    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+    return ldl_factor(S.ldl, W.A, W.L, W.ldl.inverse_diagonal, W.ldl.scratch)
 
 
 @formula
@@ -261,7 +261,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
     """
     dx = W.velocities.scratch_1
     r = W.rows.scratch_1
-    z = W.D[2]
+    z = W.ldl.right_hand_side
     for d in range(x.shape[0]):
         dx[d] = 0.0
     if loaded:
@@ -269,7 +269,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
             apply_inverse_mass(S, b, rhs, S.tree.v[b], dx, S.tree.v[b])
     for k in range(r.shape[0]):
         z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx) if loaded else r[k]
-    ldl_solve(S.ldl, W.L, W.D[0], z)
+    ldl_solve(S.ldl, W.L, W.ldl.inverse_diagonal, z)
     for k in range(r.shape[0]):
         mu = z[S.ldl.perm[k]]
         lam[k] += mu
@@ -301,13 +301,13 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
 @formula
 def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Add to x and lam one solve for the residuals of both equations; returns what `residual_coupled` does."""
-    z = W.D[2]
+    z = W.ldl.right_hand_side
     nv = x.shape[0]
     for d in range(nv):
         z[S.ldl.perm[d]] = rhs[d]
     for k in range(lam.shape[0]):
         z[S.ldl.perm[nv + k]] = W.rows.scratch_1[k]
-    ldl_solve(S.ldl, W.L, W.D[0], z)
+    ldl_solve(S.ldl, W.L, W.ldl.inverse_diagonal, z)
     for d in range(nv):
         x[d] += z[S.ldl.perm[d]]
     for k in range(lam.shape[0]):

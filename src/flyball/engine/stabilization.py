@@ -103,9 +103,9 @@ def position_rounding(S, W, q):
     """Rounding of the largest violation: the last digit of the frames' distances from the origin."""
     update_shown_frames(S, W, q)
     far = 0.0
-    for f in range(W.FK.shape[0]):
+    for f in range(W.frames.shape[0]):
         for i in range(3):
-            far = max(far, magnitude(W.FK[f, i]))
+            far = max(far, magnitude(W.frames.position[f, i]))
     return LAST_DIGIT * far
 
 

@@ -137,7 +137,7 @@ def _nonparallel_axes(case: ContradictionCase, holding: list[str]) -> str:
         if isinstance(e, Joint) and e.needs_axis:
             k = s.frame_at.get((name, "F", ""))
             if k is not None:
-                axes[name] = case.c.work.FK[k, 3:12].reshape(3, 3)[:, 2].copy()
+                axes[name] = case.c.work.frames.rotation[k].reshape(3, 3)[:, 2].copy()
     best: list[str] = []
     for axis in axes.values():
         same = [k for k, a in axes.items() if np.linalg.norm(np.cross(a, axis)) < PARALLEL_TOLERANCE]

@@ -153,7 +153,7 @@ def _angular_velocity_rows(c: CompiledMechanism, b: int) -> np.ndarray:
     v0 = int(c.values.system.tree.v[b])
     if c.values.system.tree.joint[b] == POINT:
         return out
-    out[:, v0 + 3 : v0 + 6] = c.work.BK[b, 3:12].reshape(3, 3)
+    out[:, v0 + 3 : v0 + 6] = c.work.bodies.rotation[b].reshape(3, 3)
     return out
 
 
@@ -184,14 +184,14 @@ def _rotation_text(a: Assembly, name: str, u: np.ndarray) -> str:
     """
     c = a.compiled
     b = c.structure.place[name]
-    p, R = c.work.BK[b, :3], c.work.BK[b, 3:12].reshape(3, 3)
+    p, R = c.work.bodies.position[b], c.work.bodies.rotation[b].reshape(3, 3)
     w, v = R @ u[3:], u[:3]
     axis = w / np.linalg.norm(w)
     at = p + np.cross(w, v) / (w @ w)
     S = c.values.system
     joints = {j.name for j in c.structure.model.joints}
     frames = {k for t in c.structure.terms if t.element.name in joints for k in (t.F, t.M)}
-    points = [p, *(c.work.FK[k, :3] for k in sorted(frames) if S.frame_body[k] == b)]
+    points = [p, *(c.work.frames.position[k] for k in sorted(frames) if S.frame_body[k] == b)]
     near = 1e-6 * c.values.length
     through = all(np.linalg.norm(np.cross(x - at, axis)) < near for x in points)
     direction = ", ".join(f"{x + 0.0:.3g}" for x in np.where(np.abs(axis) < 1e-9, 0.0, axis))

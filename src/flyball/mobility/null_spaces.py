@@ -128,7 +128,7 @@ def undetermined_components(a: Assembly, lam: np.ndarray, names: list[str]) -> d
     """
     c = a.compiled
     planar = c.structure.model.planar
-    wrenches = self_stresses(c.values, lambda k: load_record(c.work.FK, k), c.z, lam, names)
+    wrenches = self_stresses(c.values, lambda k: load_record(c.work.frames, k), c.z, lam, names)
     largest = max(np.abs(w).max() for w in wrenches.values())
     out = {}
     for name, w in wrenches.items():

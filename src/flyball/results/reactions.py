@@ -28,7 +28,15 @@ from ..model.contact_point import Touch
 from ..model.force import CoordinateForce
 from ..model.messages import suggest
 from ..tables.constraint_rows import reacting_element
-from .recorded_kinematics import Wrench, term_coefficient, term_over_time, unit_effort_wrench, zero_wrench
+from ..tables.table_definitions import Wrenches
+from .recorded_kinematics import (
+    Wrench,
+    term_coefficient,
+    term_over_time,
+    unit_effort_wrench,
+    zero_wrench,
+    zero_wrenches,
+)
 
 if TYPE_CHECKING:
     from ..tables.structure_definition import Structure
@@ -73,7 +81,7 @@ class JointReactions:
         """Return the wrench through a tree joint, without the efforts of drivers that prescribe its coordinates."""
         result, s = self._result, self._result.values.structure
         joint, tree = s.model[name], s.tree_joints[name]
-        force, torque = load3(self.through, tree.child, 0), load3(self.through, tree.child, 3)
+        force, torque = load3(self.through.force, tree.child, 0), load3(self.through.torque, tree.child, 0)
         at = result.records.frame(s.frame_at[name, "M", ""])[0]
         torque = add(torque, cross(sub(result.records.body(tree.child)[0], at), force))
         if tree.reversed:
@@ -87,7 +95,7 @@ class JointReactions:
         return force, torque
 
     @cached_property
-    def through(self) -> np.ndarray:
+    def through(self) -> Wrenches:
         """Return the wrench of every body's tree joint on the body, (nb, 6, n).
 
         Force [N], and torque [N m] about the body's centre of mass, world axes.
@@ -97,8 +105,9 @@ class JointReactions:
         for b in range(len(S.tree.parent) - 1, -1, -1):
             parent = int(S.tree.parent[b])
             if parent >= 0:
-                apply_wrench(W, parent, 1.0, load3(W.FB, b, 0), load3(W.FB, b, 3), load3(W.BK, b, 0))
-        return -W.FB
+                force, torque = load3(W.body_wrenches.force, b, 0), load3(W.body_wrenches.torque, b, 0)
+                apply_wrench(W, parent, 1.0, force, torque, load3(W.bodies.position, b, 0))
+        return -W.body_wrenches  # type: ignore[no-any-return]
 
     def _acting(self) -> SimpleNamespace:
         """Kinematics, and the wrenches on every body except those of tree joints: gravity, inertia, forces, rows."""
@@ -118,12 +127,13 @@ class JointReactions:
     def _inertial(self) -> SimpleNamespace:
         """Return kinematics, and gravity minus the inertia forces of each body."""
         S, records = self._result.values.system, self._result.records
-        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
+        W = SimpleNamespace(bodies=records.W.bodies, body_wrenches=zero_wrenches(records))
         gravity = tuple(S.gravity)
         for b in range(len(S.tree.parent)):
             _, R, w, _, alpha, a = records.body(b)
-            store3(W.FB, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))
-            store3(W.FB, b, 3, neg(mv(R, euler_moment(load9(S.bodies.inertia, b, 0), mtv(R, w), mtv(R, alpha)))))
+            store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))
+            moment = euler_moment(load9(S.bodies.inertia, b, 0), mtv(R, w), mtv(R, alpha))
+            store3(W.body_wrenches.torque, b, 0, neg(mv(R, moment)))
         return W
 
     def _between(self, W: SimpleNamespace, name: str) -> None:
@@ -377,8 +387,8 @@ class ImpulseReactions(JointReactions):
         out = dict(self._by_rows)
         for name, tree in s.tree_joints.items():
             W = self._onto(out, name)
-            force, torque = load3(self.through, tree.child, 0), load3(self.through, tree.child, 3)
-            at, parent = load3(W.BK, tree.child, 0), int(result.values.system.tree.parent[tree.links[0]])
+            force, torque = load3(self.through.force, tree.child, 0), load3(self.through.torque, tree.child, 0)
+            at, parent = load3(W.bodies.position, tree.child, 0), int(result.values.system.tree.parent[tree.links[0]])
             apply_wrench(W, tree.child, 1.0, force, torque, at)
             if parent >= 0:
                 apply_wrench(W, parent, -1.0, force, torque, at)
@@ -410,14 +420,14 @@ class ImpulseReactions(JointReactions):
                 self._along(out, name, at, impulse + result.records.zeros())
             elif at >= 0:
                 W = self._onto(out, name)
-                apply_wrench(W, at, 1.0, tuple(impulse), tuple(more[0]), load3(W.BK, at, 0))
+                apply_wrench(W, at, 1.0, tuple(impulse), tuple(more[0]), load3(W.bodies.position, at, 0))
         return out
 
     def _onto(self, out: dict[str, np.ndarray], name: str) -> SimpleNamespace:
         """Return kinematics, and the accumulated effect of an element on the bodies."""
         records = self._result.records
-        FB = out.setdefault(name, records.zeros(len(self._result.values.system.tree.parent), 6))
-        return SimpleNamespace(BK=records.W.BK, FB=FB)
+        wrenches = out.setdefault(name, zero_wrenches(records))
+        return SimpleNamespace(bodies=records.W.bodies, body_wrenches=wrenches)
 
     def _along(self, out: dict[str, np.ndarray], name: str, slot: int, effort: np.ndarray) -> None:
         """Add an impulse along a measured quantity."""
@@ -435,17 +445,18 @@ class ImpulseReactions(JointReactions):
     def _inertial(self) -> SimpleNamespace:
         """Return kinematics, and the momentum that each body lost, about its centre of mass."""
         S, records = self._result.values.system, self._result.records
-        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
+        W = SimpleNamespace(bodies=records.W.bodies, body_wrenches=zero_wrenches(records))
         for b in range(len(S.tree.parent)):
             _, R, w, v, _, _ = records.body(b)
             _, _, w_after, v_after, _, _ = self._after.records.body(b)
-            store3(W.FB, b, 0, scale(S.bodies.mass[b], sub(v, v_after)))
-            store3(W.FB, b, 3, neg(mv(R, mv(load9(S.bodies.inertia, b, 0), mtv(R, sub(w_after, w))))))
+            store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(v, v_after)))
+            gained = mv(load9(S.bodies.inertia, b, 0), mtv(R, sub(w_after, w)))
+            store3(W.body_wrenches.torque, b, 0, neg(mv(R, gained)))
         return W
 
     def _acting(self) -> SimpleNamespace:
         """Return the same with rows and applied impulses."""
         W = self._inertial()
         for wrenches in self._by_rows.values():
-            W.FB += wrenches
+            W.body_wrenches += wrenches
         return W

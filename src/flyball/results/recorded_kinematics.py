@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..compiler.struct_layout import Record
 from ..engine.kinematics import (
     BodyKinematics,
     BodyKinematicsOverTime,
@@ -30,6 +31,7 @@ from ..math.vec import add, cross, dot, load3, load9, matrix_product, mm, neg, s
 from ..model.body import Frame, Located
 from ..model.joint import Coordinate, Joint
 from ..tables.law_inputs import force_reading_count
+from ..tables.table_definitions import KinematicRecords, Twists, Wrenches
 from ..tables.values import Values
 
 if TYPE_CHECKING:
@@ -56,9 +58,11 @@ class RecordedMotion:
         nb, nv = len(S.tree.parent), v.shape[1]
         own = [] if vdot is None else [vdot]
         self.dtype = np.result_type(q, v, *own, S.const)  # complex for derivatives
-        self.W = BodyKinematicsOverTime(self.zeros(nb, 24), self.zeros(nv, 6), self.zeros(nb, 3))
+        self.W: Any = BodyKinematicsOverTime(
+            self.records(KinematicRecords, nb), self.records(Twists, nv), self.zeros(nb, 3)
+        )
         if self.dtype == float:
-            one = BodyKinematics(np.zeros((nb, 24)), np.zeros((nv, 6)), np.zeros((nb, 3)))
+            one = BodyKinematics(KinematicRecords.blank(nb), Twists.blank(nv), np.zeros((nb, 3)))
             q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
             kinematics_over_time(BodyTables(S.tree, S.bodies), one, q, v, self.W)
         else:
@@ -75,20 +79,24 @@ class RecordedMotion:
         """Return zeros at every time."""
         return np.zeros((*shape, self.n), self.dtype)
 
+    def records(self, of: type[Record], count: int) -> Any:
+        """Return records of zeros at every time."""
+        return self.zeros(count, of.layout.width).view(of)
+
     def _accelerate(self, vdot: np.ndarray) -> None:
-        """Replace the bias accelerations in W.BK by true ones.
+        """Replace the bias accelerations of the bodies by true ones.
 
         The difference is transmitted from parent to child as in a rigid body, and every twist column adds its vdot.
         """
         S, W = self.x.system, self.W
         missing: list[tuple[tuple, tuple]] = []
         for b in range(len(S.tree.parent)):
-            p, _, _, _, bias_alpha, bias_a = load_record(W.BK, b)
+            p, _, _, _, bias_alpha, bias_a = load_record(W.bodies, b)
             alpha = a = (0.0, 0.0, 0.0)
             parent = int(S.tree.parent[b])
             if parent >= 0:
                 alpha, a = missing[parent]
-                a = add(a, cross(alpha, sub(p, load3(W.BK, parent, 0))))
+                a = add(a, cross(alpha, sub(p, load3(W.bodies.position, parent, 0))))
             arm = sub(p, load3(W.O, b, 0))
             for i in range(S.tree.nv[b]):
                 turn, shift = twist_column(S, W, b, i)
@@ -97,17 +105,17 @@ class RecordedMotion:
                 a = add(a, scale(s, add(shift, cross(turn, arm))))
             missing.append((alpha, a))
         for b, (alpha, a) in enumerate(missing):
-            _, _, _, _, bias_alpha, bias_a = load_record(W.BK, b)
-            store3(W.BK, b, 18, add(bias_alpha, alpha))
-            store3(W.BK, b, 21, add(bias_a, a))
+            _, _, _, _, bias_alpha, bias_a = load_record(W.bodies, b)
+            store3(W.bodies.angular_acceleration, b, 0, add(bias_alpha, alpha))
+            store3(W.bodies.acceleration, b, 0, add(bias_a, a))
 
     def body(self, b: int) -> KinematicRecord:
         """Record of body b's centre of mass."""
-        return load_record(self.W.BK, b)
+        return load_record(self.W.bodies, b)
 
     def bodies(self, b: Sequence[int] | np.ndarray) -> KinematicRecord:
         """Records of several bodies' centres of mass: arrays (bodies, n)."""
-        return load_record(self.W.BK[b].swapaxes(0, 1)[None], 0)
+        return load_record(self.W.bodies[b].swapaxes(0, 1)[None], 0)
 
     def frame(self, k: int) -> KinematicRecord:
         """Record of frame k."""
@@ -271,6 +279,11 @@ def unit_effort_wrench(result: Result, owner: Joint | Located, what: str) -> Wre
     _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
     return scale(c.sign, force), scale(c.sign, torque)
+
+
+def zero_wrenches(records: RecordedMotion) -> Any:
+    """Return zero wrenches on all bodies at every time, `Wrenches`."""
+    return records.records(Wrenches, len(records.x.system.tree.parent))
 
 
 def zero_wrench(records: RecordedMotion) -> Wrench:

@@ -28,7 +28,7 @@ from ..simulation.initial_state import InitialState
 from ..simulation.prescribed_motion import cumulative_integrals, refined_nodes
 from ..simulation.simulate import run_compiled_loop
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import System, Work, named_arrays, with_numbers
+from ..tables.table_definitions import KinematicRecords, System, Work, named_arrays, with_numbers
 from ..tables.values import Values
 
 PARAMETER_TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "scales", "units")
@@ -295,7 +295,7 @@ def _residual_tables(s: Structure, system: System) -> list[np.ndarray]:
     """The tables that the residuals read, and the frame records, whose ground frames contain parameters."""
     bodies = system.bodies._replace(**{name: 0.0 * getattr(system.bodies, name) for name in SOLVER_FIELDS})
     tables = [x for name in PARAMETER_TABLES for _, x in named_arrays(getattr(system._replace(bodies=bodies), name))]
-    return [*tables, allocate_work(s, system, complex).FK]
+    return [*tables, allocate_work(s, system, complex).frames]
 
 
 def _combined_tables(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
@@ -311,4 +311,5 @@ def _combined_tables(s: Structure, system: System, values: Sequence[Values]) -> 
     views = [tables[i:j].reshape(x.shape) for i, j, x in zip(ends[:-1], ends[1:], parts, strict=True)]
     own = iter(views)
     system = with_numbers(system, lambda _, x: next(own), PARAMETER_TABLES)
-    return system, allocate_work(s, system, complex)._replace(FK=views[-1]), tables
+    work = allocate_work(s, system, complex)._replace(frames=views[-1].view(KinematicRecords))
+    return system, work, tables

@@ -129,7 +129,7 @@ def rounding_error_remark(clock: ex.StepState) -> str:
 def origin_distance_remark(a: Assembly, clock: ex.StepState) -> str:
     """Return a remark if the mechanism is so far from the origin that rounding of positions exceeds the tolerance."""
     length = a.compiled.values.length
-    far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
+    far = float(np.abs(a.compiled.array("frames").position).max(initial=0.0))
     digit = math.ulp(far)
     if not digit > (clock.real.atol + clock.real.rtol) * length:
         return ""
@@ -444,8 +444,8 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
                     return f"the normal force of {e.title} is not finite"
                 continue
             F, M, par = (
-                load_record(W.FK, S.forces.F[k]),
-                load_record(W.FK, S.forces.M[k]),
+                load_record(W.frames, S.forces.F[k]),
+                load_record(W.frames, S.forces.M[k]),
                 force_row(S.force_parameters, k),
             )
             x, y = law_inputs(c, k)

@@ -506,9 +506,9 @@ def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v
 def _body_states(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
     """Return pose and velocity of every body, with prescribed coordinates at their prescribed values."""
     c.at(t, q, v, MOTION)
-    K = c.work.BK.copy()
+    K = c.work.bodies.copy()
     return {
-        name: BodyState(K[b, :3], K[b, 3:12], K[b, 15:18], K[b, 12:15])
+        name: BodyState(K.position[b], K.rotation[b], K.velocity[b], K.angular_velocity[b])
         for name, b in c.structure.place.items()
         if b >= 0
     }

@@ -134,7 +134,7 @@ def law_inputs(c: CompiledMechanism, k: int) -> tuple[float, float]:
     F, M = S.forces.F[k], S.forces.M[k]
     if isinstance(e, CoordinateForce):
         return float(W.sensed.value[F]), float(W.sensed.rate[F])
-    x, y = e.inputs(force_row(S.force_parameters, k), load_record(W.FK, F), load_record(W.FK, M))
+    x, y = e.inputs(force_row(S.force_parameters, k), load_record(W.frames, F), load_record(W.frames, M))
     return float(x), float(y)
 
 

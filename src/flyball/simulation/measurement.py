@@ -141,7 +141,9 @@ class Measurement:
         self.q, self.v = self.state[: s.nq], self.state[s.nq : s.nq + s.nv]
         self._evaluate = c.bound(tableau("rk45"), clock, np.zeros((0, 0)))
         self._columns = np.array([s.slots[name] for name in names], np.int64)
-        self._values, self._records = c.work.sensed.value, c.work.BK
+        self._values, bodies = c.work.sensed.value, c.work.bodies
+        self._positions, self._rotations = bodies.position, bodies.rotation.reshape(-1, 3, 3)
+        self._velocities, self._angular_velocities = bodies.velocity, bodies.angular_velocity
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
         self._turns = self._counted_angles(())
 
@@ -213,9 +215,8 @@ class Measurement:
         b, p, R = self._frame(name)
         if b < 0:
             return p.copy(), R.copy()
-        record = self._records[b]
-        turned = record[3:12].reshape(3, 3)
-        return record[:3] + turned @ p, turned @ R
+        turned = self._rotations[b]
+        return self._positions[b] + turned @ p, turned @ R
 
     def velocity(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocity of the origin and the angular velocity of a body's reference frame or a named frame.
@@ -225,9 +226,8 @@ class Measurement:
         b, p, _ = self._frame(name)
         if b < 0:
             return np.zeros(3), np.zeros(3)
-        record = self._records[b]
-        spin = record[12:15].copy()
-        return record[15:18] + np.cross(spin, record[3:12].reshape(3, 3) @ p), spin
+        spin = self._angular_velocities[b].copy()
+        return self._velocities[b] + np.cross(spin, self._rotations[b] @ p), spin
 
     def _frame(self, name: str) -> tuple[int, np.ndarray, np.ndarray]:
         """Return the body's row, and the frame's position and rotation on it."""

@@ -231,7 +231,7 @@ class ReleasedMechanism:
         turning = []
         for b, (v0, nv) in enumerate(zip(S.tree.v, S.tree.nv, strict=True)):
             if nv == 6:
-                turning.append(W.BK[b, 3:12].reshape(3, 3) @ v[v0 + 3 : v0 + 6])
+                turning.append(W.bodies.rotation[b].reshape(3, 3) @ v[v0 + 3 : v0 + 6])
         return np.r_[out, np.concatenate(turning)] if turning else out
 
     def outline(self, x: CurvePoint) -> list[tuple[str, str, np.ndarray]]:
@@ -240,7 +240,7 @@ class ReleasedMechanism:
         s = self.closure.c.structure
         names = {b: name for name, b in s.place.items()}
         return [
-            (names[spec.body], spec.element.name, self.closure.c.work.FK[k, :3].copy())
+            (names[spec.body], spec.element.name, self.closure.c.work.frames.position[k].copy())
             for k, spec in enumerate(s.frames)
             if spec.role in ("F", "M") and isinstance(spec.element, Joint) and not spec.coordinate
         ]

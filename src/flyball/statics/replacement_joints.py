@@ -250,7 +250,7 @@ def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[st
     par, first = force_row(S.force_parameters, k), int(S.forces.laws[k, 0])
     x, load, law = float(W.sensed.value[S.forces.F[k]]), 0.0, 0.0
     if S.forces.load[k] >= 0:
-        load = float(e.load(par, record(W.FK, int(S.forces.M[k])), *reaction(e.joint)))
+        load = float(e.load(par, record(W.frames, int(S.forces.M[k])), *reaction(e.joint)))
     if first >= 0:
         stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
         law = float(evaluate(S.code, S.const, first, stack, (at.t, x, 0.0), W.sensed))

@@ -397,7 +397,7 @@ def _curve_parameters(x: Values, T: TracedEquations) -> tuple[list[CurveParamete
         kind = t.formula.of_kind
         if kind.foot is None or kind.progress is None:
             continue
-        F, M, par = load_record(W.FK, t.F), load_record(W.FK, t.M), row_parameters(S.term_parameters, k)
+        F, M, par = load_record(W.frames, t.F), load_record(W.frames, t.M), row_parameters(S.term_parameters, k)
         symbol = T.z[S.terms.hint[k]]
         p = mtv(F[1], sub(M[0], F[0]))
         x0, x1, _, y0, y1, _ = point(par, symbol, S.const)
@@ -493,7 +493,7 @@ def curve_parameters_at(
         )
     for place in places:
         t = x.values.structure.terms[place.term]
-        records = [c for k in (t.F, t.M) for part in load_record(W.FK, k)[:2] for c in part]
+        records = [c for k in (t.F, t.M) for part in load_record(W.frames, k)[:2] for c in part]
         given = [*x.cleaned(object_vector([*records, *row_parameters(S.term_parameters, place.term)])), *S.const]
         numbers = [float(np.real(n)) for n in evaluate(given, values)]
         F, M = ((tuple(n[:3]), tuple(n[3:])) for n in (numbers[:12], numbers[12:24]))
@@ -519,7 +519,7 @@ def generalised_forces(x: NamedEquations) -> list[tuple[str, np.ndarray]]:
     """(what, forces along the velocities) of inertia, of gravity and of every force."""
     T = x.traced
     S, W = T.system, T.work
-    W = W._replace(FB=np.array([[0.0] * W.FB.shape[1]] * len(W.FB), object).reshape(W.FB.shape))
+    W = W._replace(body_wrenches=W.body_wrenches.copy())
     turning = _gathered_forces(S._replace(gravity=np.array([0.0] * 3, object)), W, None)
     out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
     if any(c != 0.0 for c in S.gravity):
@@ -535,8 +535,8 @@ def _gathered_forces(S: System, W: Work, t: Any) -> np.ndarray:
     """Forces along the velocities: of inertia and weight, or of the elements in the tables."""
     f = np.empty(W.velocities.solved.shape[0], object)
     f[:] = 0.0
-    W.FB[:] = 0.0
-    rates = np.zeros(len(S.forces.F) + W.y.size, object)
+    W.body_wrenches[:] = 0.0
+    rates = np.zeros(len(S.forces.F) + W.trial.size, object)
     if t is None:
         inertial_wrenches(S, W)
         gather_forces(S, W, f)

@@ -278,16 +278,17 @@ class _ShapeRows:
         where, movers, sizes, com = self._frame(e)
         forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(e, s)]
         count, n = len(movers), len(forms)
-        ints, reals = ct.Shapes.blank(count, n), ct.Dimensions.blank(count, n)
+        ints, reals = ct.Shapes.blank(count * n), ct.Dimensions.blank(count * n)
+        own_ints, own_reals = ints.reshape(count, n, -1), reals.reshape(count, n, -1)
         mine = np.zeros((n, 2, 3))
         for j, (s, form) in enumerate(forms):
             f = form if where is None else form.transformed(*where)
-            reals[:, j] = _shape_numbers(f, com, sizes, self._places)
-            ints[:, j] = self._ints(e, s, f, sizes)
+            own_reals[:, j] = _shape_numbers(f, com, sizes, self._places)
+            own_ints[:, j] = self._ints(e, s, f, sizes)
             mine[j] = self._surface_velocity(e, s, where)
-        ints.mover = movers[:, None]
-        self.ints.append(ints.reshape(-1, ct.Shapes.layout.width))
-        self.reals.append(reals.reshape(-1, ct.Dimensions.layout.width))
+        ints.mover = np.repeat(movers, n)
+        self.ints.append(ints)
+        self.reals.append(reals)
         self.own.append(np.broadcast_to(mine, (count, n, 2, 3)).reshape(-1, 2, 3))
         self.part.append(np.full(count * n, k))
         self.code += [None if f.owner is None else code_table(f.owner, SUPPORT_SIGNATURES) for _, f in forms] * count

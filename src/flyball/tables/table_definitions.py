@@ -12,7 +12,22 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..compiler.struct_layout import COMPLEX, CodeTables1, Column, Float2, Float3, Int1, Int2, Number1, Number2, Record
+from ..compiler.struct_layout import (
+    COMPLEX,
+    CodeTables1,
+    Column,
+    Float1,
+    Float2,
+    Float3,
+    Int1,
+    Int2,
+    Number1,
+    Number2,
+    Record,
+    Vector3,
+    Vector6,
+    Vector9,
+)
 from ..constraints.registry import BY_ADDRESS
 from ..numerics.sparse_factorisation import LDLPattern
 
@@ -416,28 +431,107 @@ class Sensed(Record, kind="Number", vectors=True):
     load_before: Annotated[np.ndarray, "bias"]  # of the pass before
 
 
+class KinematicRecords(Record, kind="Number", rows=True):
+    """Kinematics of points with axes, in components along the world's axes."""
+
+    position: Vector3
+    rotation: Vector9  # row by row
+    angular_velocity: Vector3
+    velocity: Vector3
+    bias_angular_acceleration: Vector3  # at vdot = 0
+    bias_acceleration: Vector3
+    angular_acceleration: Annotated[np.ndarray, "bias_angular_acceleration"]  # with vdot, where it was added
+    acceleration: Annotated[np.ndarray, "bias_acceleration"]
+
+
+class Wrenches(Record, kind="Number", rows=True):
+    """Wrenches on bodies, in components along the world's axes."""
+
+    force: Vector3
+    torque: Vector3
+    acceleration: Annotated[np.ndarray, "force"]  # by vdot alone, as scratch of `recorded_figures`
+    angular_acceleration: Annotated[np.ndarray, "torque"]
+
+
+class Twists(Record, kind="Number", rows=True):
+    """Twists per unit of velocities, in components along the world's axes."""
+
+    angular: Vector3
+    linear: Vector3
+
+
+class CompositeBodies(Record, kind="Number", rows=True):
+    """Subtrees as rigid bodies, about the reference points of their roots."""
+
+    mass: Column
+    first_moment: Vector3
+    inertia: Vector6  # xx, xy, xz, yy, yz, zz
+    offset: Vector3  # from the reference point of the root's parent
+
+
+class ArticulatedBodies(Record, kind="Number", rows=True):
+    """Articulated inertias that bodies' children have stored, and what is passed along branches in solves."""
+
+    rotational: Vector6  # J, H, K of `engine/articulated_body.py`
+    coupling: Vector9
+    linear: Vector6
+    eliminated: Column  # part of the trace of J
+    mass: Column
+    stored: Column  # 1 where there is such an inertia
+    torque: Vector3
+    force: Vector3
+    angular_acceleration: Annotated[np.ndarray, "torque"]
+    acceleration: Annotated[np.ndarray, "force"]
+
+
+class Pivots(Record, kind="Number", rows=True):
+    """Velocities eliminated from articulated inertias."""
+
+    torque: Vector3  # U = I X: the wrench per unit acceleration
+    force: Vector3
+    inertia: Column  # D = X . U
+    inverse_inertia: Column
+
+
+class FactorVectors(Record, kind="Number", vectors=True):
+    """Vectors of the factored matrix and of solves with it."""
+
+    inverse_diagonal: Float1
+    scratch: Float1
+    right_hand_side: Float1
+
+
+class TrialState(Record, kind="Number", vectors=True):
+    """State at which equations are evaluated."""
+
+    state: Float1
+    rate: Float1
+
+
 class Work(NamedTuple):
     """Workspace of one run on one thread: nothing is allocated inside the loops."""
 
-    BK: Number2  # (nb, 24): kinematics of the bodies
-    FK: Number2  # (nf, 24): kinematics of the frames
-    X: Number2  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
+    bodies: KinematicRecords  # (nb,): of the centres of mass
+    frames: KinematicRecords  # (nf,): of the origins
+    twists: Twists  # (nv,): of each velocity, at its body's reference point
     O: Number2  # (nb, 3): that reference point
-    FB: Number2  # (nb, 6): force on each body, torque about its centre of mass
-    IC: Number2  # (nb, 30): composite inertias; articulated inertias, and the pending values of solves with them
+    body_wrenches: Wrenches  # (nb,): on each body, about its centre of mass
+    composites: CompositeBodies  # (nb,)
+    articulated: ArticulatedBodies  # (nb,)
+    pivots: Pivots  # (nv,)
     M: Number1  # (nM,): mass matrix entries
     G: Number1  # (nG,): constraint Jacobian, then gradients of the measured quantities
     H: Number1  # (nG,): M^-1 G^T
-    T: Number2  # (nt, 6): wrench of each term on M, where loads are needed; else (0, 6)
+    term_wrenches: Wrenches  # (nt,): of each term on M, where loads are needed; else (0,)
     rows: RowScratch
     velocities: VelocityScratch
     sensed: Sensed  # (2 nm + nl + ne + nc + nw)
     modes: Modes
     A: Number1  # matrix to be factored
     L: Number1  # its factor
-    D: Number2  # (3, n): inverse diagonal, scratch, right-hand side
+    ldl: FactorVectors  # (3, n)
     stack: Number2  # law evaluation
-    y: Number2  # (3, ny): trial states
+    trial: TrialState  # (2, ny)
     options: Options
     counts: Counts
     generated: Int1  # (15,): while generated code is in use, its addresses as in `System.flat`; else 0
@@ -446,7 +540,6 @@ class Work(NamedTuple):
 
 ComplexSystem = Annotated[System, COMPLEX]
 ComplexWork = Annotated[Work, COMPLEX]
-# kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24
 
 
 # columns of Surfaces.pair

@@ -207,12 +207,12 @@ def _body_places(here: EventContext, x: Values) -> BodyPlaces:
     """Evaluate the body poses at the present state with these values."""
     c, s = here.c, here.structure
     here.evaluate()
-    K, out, moving = c.work.BK, {}, {}
+    K, out, moving = c.work.bodies, {}, {}
     for name, b in s.place.items():
         if b >= 0:
-            R = K[b, 3:12].reshape(3, 3)
-            out[name] = np.r_[K[b, :3] - R @ x.bodies[name].com, R.ravel(), K[b, :3]]
-            moving[name] = K[b, 12:18].copy()
+            p, R = K.position[b], K.rotation[b].reshape(3, 3)
+            out[name] = np.r_[p - R @ x.bodies[name].com, R.ravel(), p]
+            moving[name] = np.r_[K.angular_velocity[b], K.velocity[b]]
     return BodyPlaces(out, moving, c.work.rows.value.copy(), c.work.rows.nu.copy())
 
 
@@ -601,7 +601,7 @@ def generalised_impulse(
     body, point, axes = _point_of_impulse(here, a)
     if a.axes == "body":
         F, T = axes @ F, axes @ T
-    about = T + np.cross(point - here.c.work.BK[body, :3], F)
+    about = T + np.cross(point - here.c.work.bodies.position[body], F)
     return _impulse_along_velocities(here, body, point, F, T), (
         "body",
         body,
@@ -627,8 +627,7 @@ def _point_of_impulse(here: EventContext, a: Impulse) -> tuple[int, Vector3, np.
     part = model[a.on]
     name = part.body if isinstance(part, Frame) else a.on
     b, drawn = here.structure.place[name], x.bodies[name]
-    record = here.c.work.BK[b]
-    R = record[3:12].reshape(3, 3)
+    p, R = here.c.work.bodies.position[b], here.c.work.bodies.rotation[b].reshape(3, 3)
     at, axes = drawn.c, R
     if isinstance(part, Frame):
         at, turned = x.poses.named(a.on)
@@ -636,7 +635,7 @@ def _point_of_impulse(here: EventContext, a: Impulse) -> tuple[int, Vector3, np.
     if a.at is not None:
         given = si_numbers(a.at, x.env, "m", f"at of {a.title}")
         at = vector(given, model.planar, f"at of {a.title}") if len(given) < 3 else np.array(given)
-    return b, record[:3] + R @ drawn.R.T @ (at - drawn.c), axes
+    return b, p + R @ drawn.R.T @ (at - drawn.c), axes
 
 
 def _impulse_along_velocities(

@@ -233,7 +233,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
     n.run_engine(MOTION)
     nq = n.S.sizes.coordinates
     a = n.gradients(np.array(leaving)) @ n.state.K[0, nq : nq + n.here.structure.nv] + n.W.sensed.bias[n.m[leaving]]
-    far = ORIGIN_ROUNDING * np.abs(n.W.FK[:, :3]).max(initial=0.0)
+    far = ORIGIN_ROUNDING * np.abs(n.W.frames.position).max(initial=0.0)
     for s, acceleration in zip(leaving, a.tolist(), strict=True):
         u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
         if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * max(LOW_FLIGHT * n.unit[s], far * (n.units[s] == "m")):

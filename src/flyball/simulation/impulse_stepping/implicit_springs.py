@@ -51,7 +51,7 @@ def spring_gradient(S, W, k, n, i, row):
         for e in range(S.row_start[r], S.row_start[r + 1]):
             row[S.column[e]] += W.G[e]
         return
-    F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
+    F, M = load_record(W.frames, S.forces.F[k]), load_record(W.frames, S.forces.M[k])
     axis = probe_direction(F, M[0], n, i)
     zero = (0.0, 0.0, 0.0)
     force, torque = (axis, zero) if i < 3 else (zero, axis)
@@ -189,7 +189,7 @@ def force_length(S, W, k, n, i):
     """Return the length of force k along its direction i of n, at the kinematics in W."""
     if S.forces.family[k] == 1:
         return W.sensed.value[S.forces.F[k]]
-    F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
+    F, M = load_record(W.frames, S.forces.F[k]), load_record(W.frames, S.forces.M[k])
     line = sub(M[0], F[0])
     if n == 1:
         return norm(line)
@@ -224,7 +224,9 @@ def save_spring_biases(A):
         if A.S.forces.family[k] == 1:
             x.bias[i] = A.W.sensed.bias[A.S.forces.F[k]]
         elif x.directions[i] < 2.0:
-            x.bias[i] = distance_bias(load_record(A.W.FK, A.S.forces.F[k]), load_record(A.W.FK, A.S.forces.M[k]))
+            x.bias[i] = distance_bias(
+                load_record(A.W.frames, A.S.forces.F[k]), load_record(A.W.frames, A.S.forces.M[k])
+            )
 
 
 @formula

@@ -259,7 +259,7 @@ def mechanism_contact_rows(A, M, C, P):
                 used += rows * n
                 queue_row(A, g, jobs, at, rows)
                 jobs += 1
-            point = add(load3(A.W.BK, b, 0), load3(P.arm, c, 3 * side))
+            point = add(load3(A.W.bodies.position, b, 0), load3(P.arm, c, 3 * side))
             side_rows(A, P, c, (b, at - A.group[g], n), point, rows)
             P.block[c, side], P.at[c, side] = at, -2 - g
             last = g

@@ -54,19 +54,18 @@ def kinetic_energy(A):
     """Return the kinetic energy at the kinematics in the engine's workspace."""
     total = 0.0
     for b in range(A.S.tree.parent.shape[0]):
-        v, w = load3(A.W.BK, b, 15), mtv(load9(A.W.BK, b, 3), load3(A.W.BK, b, 12))
+        v = load3(A.W.bodies.velocity, b, 0)
+        w = mtv(load9(A.W.bodies.rotation, b, 0), load3(A.W.bodies.angular_velocity, b, 0))
         total += 0.5 * A.S.bodies.mass[b] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.bodies.inertia, b, 0), w))
     return total
 
 
 @formula
-def gravity_sum(A, column):
-    """Return the sum of m g . x, x from three columns of the bodies' kinematics: positions from 0, velocities from
-    15.
-    """
+def gravity_sum(A, vectors):
+    """Return the sum of m g . x over the bodies, with x their positions or velocities."""
     total = 0.0
     for b in range(A.S.tree.parent.shape[0]):
-        x = load3(A.W.BK, b, column)
+        x = load3(vectors, b, 0)
         total += A.S.bodies.mass[b] * (A.S.gravity[0] * x[0] + A.S.gravity[1] * x[1] + A.S.gravity[2] * x[2])
     return total
 
@@ -81,13 +80,13 @@ def add_reaction_work(A, lam, v):
 @formula
 def save_gravity_work(A, h):
     """Store gravity's work over the step at the mean velocities, as for the works of impulses."""
-    A.real.gravity_work = h * gravity_sum(A, 15)
+    A.real.gravity_work = h * gravity_sum(A, A.W.bodies.velocity)
 
 
 @formula
 def close_energy_account(A):
     """Account for the energy taken by the projection onto the joints, at the end of a step with contact impulses."""
-    now = -gravity_sum(A, 0)
+    now = -gravity_sum(A, A.W.bodies.position)
     if A.real.kinetic >= 0.0:
         A.real.joint_loss += A.real.kinetic - kinetic_energy(A) - (now - A.real.potential) - A.real.gravity_work
     A.real.potential = now
@@ -346,10 +345,10 @@ def write_body_states(A, M, poses):
     for k in range(A.mover.shape[0]):
         b, to = A.mover[k, 0], A.count.first + k
         if poses:
-            store3(M.pose, to, 0, load3(A.W.BK, b, 0))
-            store9(M.pose, to, 3, load9(A.W.BK, b, 3))
-        store3(M.twist, to, 0, load3(A.W.BK, b, 15))
-        store3(M.twist, to, 3, load3(A.W.BK, b, 12))
+            store3(M.pose, to, 0, load3(A.W.bodies.position, b, 0))
+            store9(M.pose, to, 3, load9(A.W.bodies.rotation, b, 0))
+        store3(M.twist, to, 0, load3(A.W.bodies.velocity, b, 0))
+        store3(M.twist, to, 3, load3(A.W.bodies.angular_velocity, b, 0))
 
 
 @formula
@@ -489,8 +488,8 @@ def account_works(A, h):
 def save_poses(A):
     """Store the poses of the movers as evaluated last."""
     for k in range(A.mover.shape[0]):
-        store3(A.pose, k, 0, load3(A.W.BK, A.mover[k, 0], 0))
-        store9(A.pose, k, 3, load9(A.W.BK, A.mover[k, 0], 3))
+        store3(A.pose, k, 0, load3(A.W.bodies.position, A.mover[k, 0], 0))
+        store9(A.pose, k, 3, load9(A.W.bodies.rotation, A.mover[k, 0], 0))
 
 
 @formula

@@ -78,13 +78,13 @@ def simplify_with_names(
 
 
 LONG_EXPRESSION = 400.0  # parts with more symbols are summed once more
-KINEMATIC_PARTS = (  # entries of a body record: index, letter, name, meaning
-    (3, 9, "R", "R"),
-    (0, 3, "p", "p"),
-    (12, 3, r"\omega", "omega"),
-    (15, 3, "v", "v"),
-    (18, 3, r"\alpha", "alpha"),
-    (21, 3, "a", "a"),
+KINEMATIC_PARTS = (  # entries of a body record: field, letter, name
+    ("rotation", "R", "R"),
+    ("position", "p", "p"),
+    ("angular_velocity", r"\omega", "omega"),
+    ("velocity", "v", "v"),
+    ("bias_angular_acceleration", r"\alpha", "alpha"),
+    ("bias_acceleration", "a", "a"),
 )
 
 
@@ -177,13 +177,13 @@ def candidate_symbols(eq: Equations) -> list[tuple[Any, Symbol]]:
     for name, b in x.values.structure.place.items():
         if b < 0:
             continue
-        record = x.cleaned(x.traced.work.BK[b])
-        for first, count, letter, plain in KINEMATIC_PARTS:
-            for k in range(count):
-                index = f"{k // 3 + 1}{k % 3 + 1}" if count == 9 else str(k + 1)
+        for field, letter, plain in KINEMATIC_PARTS:
+            numbers = x.cleaned(getattr(x.traced.work.bodies, field)[b])
+            for k, number in enumerate(numbers):
+                index = f"{k // 3 + 1}{k % 3 + 1}" if field == "rotation" else str(k + 1)
                 circle = r",\circ" if plain in ("alpha", "a") else ""
                 latex = rf"{letter}_{{{index}{circle}}}^{{\text{{{name}}}}}"
-                out.append((record[first + k], Symbol(f"{name}.{plain}_{index}", "shared", latex, "", name)))
+                out.append((number, Symbol(f"{name}.{plain}_{index}", "shared", latex, "", name)))
     return out
 
 

@@ -115,9 +115,9 @@ class Functions:
             body = x.bodies[owner]
             own = np.asarray(body.R, object)
             offset, turn = own.T @ (p - np.asarray(body.c, object)), own.T @ R
-            axes, w = load9(W.BK, b, 3), load3(W.BK, b, 12)
+            axes, w = load9(W.bodies.rotation, b, 0), load3(W.bodies.angular_velocity, b, 0)
             arm = mv(axes, tuple(offset))
-            at, v = add(load3(W.BK, b, 0), arm), add(load3(W.BK, b, 15), cross(w, arm))
+            at, v = add(load3(W.bodies.position, b, 0), arm), add(load3(W.bodies.velocity, b, 0), cross(w, arm))
             found.append((at, np.array(mm(axes, tuple(turn.ravel())), object).reshape(3, 3), v, w))
         return found
 

@@ -23,7 +23,7 @@ from ...expression_graph.graph import object_vector, zero_objects
 from ...expression_graph.printers.routines import refuse_too_long
 from ...expression_graph.tracing import TracedEquations
 from ...numerics.sparse_factorisation import LDLPattern, analyse_ldl, ldl_factor, ldl_solve
-from ...tables.table_definitions import map_arrays
+from ...tables.table_definitions import FactorVectors, map_arrays
 
 # The first refinement reduces the regularisation error of a well determined solution below rounding.
 REFINEMENTS = 2
@@ -91,10 +91,10 @@ def schur(x: TracedEquations) -> SinglePass:
     W.G[: len(rows)] = x.G[rows, S.column[: len(rows)]]
     _refuse_long(S.ldl)
     n = len(S.ldl.perm)
-    D = np.array([zero_objects(n), zero_objects(n), zero_objects(n)], object)
-    W = W._replace(A=zero_objects(len(S.ldl.Ai) + 1), L=zero_objects(len(S.ldl.Li)), D=D)
+    ldl = zero_objects(FactorVectors.layout.width, n).view(FactorVectors)
+    W = W._replace(A=zero_objects(len(S.ldl.Ai) + 1), L=zero_objects(len(S.ldl.Li)), ldl=ldl)
     factor_schur(S, W)
-    L, D = W.L, W.D[0]
+    L, D = W.L, W.ldl.inverse_diagonal
 
     def once(f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         dx = zero_objects(len(f))

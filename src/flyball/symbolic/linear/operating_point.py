@@ -50,7 +50,7 @@ def joint_velocities(m: TracedMechanism, q: Sequence[tuple[Node, Any]]) -> list[
         told = m.values.bodies[name]
         if b >= 0 and not all(is_zero(x) for x in (*told.v, *told.w)):
             wanted += [*told.w, *told.v]
-            has += list(m.x.work.BK[b, 12:18])
+            has += [*m.x.work.bodies.angular_velocity[b], *m.x.work.bodies.velocity[b]]
     if not wanted:
         return m.values.v.tolist()
     nodes = [m.graph.node(x) for x in has]
