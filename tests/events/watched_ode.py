@@ -10,7 +10,7 @@ import numpy as np
 from flyball.numerics.event_location.event_steps import finish_step_with_events, start_event_segment
 from flyball.numerics.event_location.guards import (
     EVENT_FOUND,
-    START_VALUES,
+    START,
     GuardState,
     allocate_guard_state,
     predict_sensed,
@@ -56,23 +56,24 @@ def report(t, y, out, S, W):
     return 0
 
 
-def watch(t, y, S, W, row):
+def watch(t, y, S, W, out):
     S.latest[:] = [t, y.copy()]
     n = len(y) // 2
-    W.g[row] = S.g(t, y[:n], y[n:])
+    out[:] = S.g(t, y[:n], y[n:])
     return 0
 
 
-def note(S, W, row):
+def note(S, W, end):
     t, y = S.latest
     n = len(y) // 2
-    W.moving[0 if row == START_VALUES else 1] = y[:n], y[n:], S.f(t, y[:n], y[n:])
-    W.g[row] = S.g(t, y[:n], y[n:])
+    W.moving[end] = y[:n], y[n:], S.f(t, y[:n], y[n:])
+    out = W.guards.start if end == START else W.guards.end
+    out[:] = S.g(t, y[:n], y[n:])
 
 
-def look(t, h, x, S, W, row):
+def look(t, h, x, S, W, out):
     predict_sensed(W, x, h)
-    W.g[row] = S.g(t + x * h, W.sensed[0, : W.moving.shape[2]], W.sensed[1, : W.moving.shape[2]])
+    out[:] = S.g(t + x * h, W.sensed[0, : W.moving.shape[2]], W.sensed[1, : W.moving.shape[2]])
 
 
 def ask(own, S, W, R, c, task):

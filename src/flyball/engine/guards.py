@@ -242,6 +242,7 @@ class ForceDistribution(NamedTuple):
     bend: Float2  # (ns, ns): change of the friction limit of each switch with each of them
     size: Float1  # (1,): the largest force of the group, weighted
     t: Float1  # (1,): time at which the guard is evaluated [s]
+    values: Float1  # (1 + 3 ns,): the guard, its terms
     door: Int1  # (1,): address of `group_guard_kernel`, set once there is a group
     Q: ConeProgram
 
@@ -253,6 +254,7 @@ def empty_distribution(ns: int, nr: int) -> ForceDistribution:
         np.zeros((ns, ns)),
         np.zeros(1),
         np.zeros(1),
+        np.zeros(1 + 3 * ns),
         np.zeros(1, np.int64),
         allocate_cone_program(ns, ns),
     )
@@ -331,36 +333,32 @@ def group_terms(G, out, first):
 
 
 @formula
-def call_group_guard(S, W, t, G, K, row):
-    """Evaluate the group's guard, the last one of a row of guards, and its terms behind it, into ``K.g[row]``.
+def call_group_guard(S, W, t, G, K, out):
+    """Write the group's guard, the last of the guards, to ``out``, and its terms behind it.
 
-    A negative row -1 - j stands for place j of those within a step. The kernel is called by address, so that loops do
-    not contain the code of all laws.
+    The kernel is called by address, so that loops do not contain the code of all laws.
     """
+    G.values[0] = NO_MARGIN
+    K.count.terms = 0
     if G.Q.count[UNKNOWN_COUNT] > 0:
         G.t[0] = t
-        call(G.door[0], S, W, G, K, K, row)
-    elif row >= 0:
-        K.g[row, K.way.shape[0] - 1] = NO_MARGIN
-        K.count.terms = 0
-    else:
-        K.compared_values[-1 - row, K.way.shape[0] - 1] = NO_MARGIN
-        K.count.terms = 0
+        call(G.door[0], S, W, G, K, K, 0)
+    for i in range(1 + K.count.terms):
+        out[K.way.shape[0] - 1 + i] = G.values[i]
 
 
 @formula
-def store_group_guard(S, W, G, K, row):
-    """Store `group_margin` and `group_terms` in that row."""
-    out, last = K.g[row] if row >= 0 else K.compared_values[-1 - row], K.way.shape[0] - 1
-    out[last] = group_margin(S, W, G.t[0], G)
-    K.count.terms = group_terms(G, out, last + 1)
+def store_group_guard(S, W, G, K):
+    """Store `group_margin` and `group_terms` in ``G.values``."""
+    G.values[0] = group_margin(S, W, G.t[0], G)
+    K.count.terms = group_terms(G, G.values, 1)
     return 0
 
 
 @kernel
-def group_guard_kernel(S: System, W: Work, G: ForceDistribution, K: GuardState, _: GuardState, row: int) -> int:
+def group_guard_kernel(S: System, W: Work, G: ForceDistribution, K: GuardState, _: GuardState, __: int) -> int:
     """`store_group_guard` as a kernel."""
-    return store_group_guard(S, W, G, K, row)
+    return store_group_guard(S, W, G, K)
 
 
 @formula

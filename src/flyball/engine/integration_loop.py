@@ -23,10 +23,7 @@ from ..constraints.switches.guard_kinds import DISTANCE_GUARDS, FORCE_GUARDS, G_
 from ..numerics.complementarity.interior_point import UNKNOWN_COUNT
 from ..numerics.event_location.event_steps import finish_step_with_events, start_event_segment
 from ..numerics.event_location.guards import (
-    CORNER_DEPTHS,
-    END_ROUNDING,
-    START_ROUNDING,
-    START_VALUES,
+    START,
     GuardState,
     allocate_guard_state,
     predict_sensed,
@@ -116,7 +113,7 @@ def store_guards_within(A, K, j):
     for i in range(last + 1):
         K.compared_values[j, i] = A[OUTPUT].rows[0, i]
     if S.guards.kind[last] == G_SHARED:
-        call_group_guard(S, A[W_], A[OWN].real.t, A[GROUP], K, -1 - j)
+        call_group_guard(S, A[W_], A[OWN].real.t, A[GROUP], K, K.compared_values[j])
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.compared_stages[j]:
             store_levels(A, K, 1 + k)
@@ -191,14 +188,14 @@ HELD_RESIDUE = 1e-10
 
 
 @formula
-def evaluate_all_guards(A, W, t, K, row):
-    """Evaluate all guards from the values in W into a row, the group's guard last, followed by its terms."""
-    S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
+def evaluate_all_guards(A, W, t, K, out):
+    """Write all guards to ``out``, from the values in W; the group's guard last, followed by its terms."""
+    S, last = A[S_], K.way.shape[0] - 1
     remove_rate_residue(S, W, K)
     guards(S, W, t, out)
     remove_guard_residue(S, W, K, out)
     if S.guards.kind[last] == G_SHARED:
-        call_group_guard(S, W, t, A[GROUP], K, row)
+        call_group_guard(S, W, t, A[GROUP], K, out)
 
 
 @formula
@@ -234,48 +231,47 @@ def renew_group(A):
 
 
 @formula
-def evaluate_with_guards(t, y, A, K, row):
-    """Evaluate the equations at a state, and the guards there. Returns a status."""
+def evaluate_with_guards(t, y, A, K, out):
+    """Evaluate the equations at a state, and write the guards there to ``out``. Returns a status."""
     own = A[OWN]
     set_state(own, t, y)
     status = call_engine(A, MOTION)
     if status == 0:
         renew_group(A)
-    evaluate_all_guards(A, A[W_], t, K, row)
+    evaluate_all_guards(A, A[W_], t, K, out)
     return status
 
 
 @formula
-def store_guard_inputs(A, K, row):
-    """Store the quantities that guards depend on at the state last evaluated, and the guards there."""
+def store_guard_inputs(A, K, end):
+    """Store the guards, and the quantities that they depend on, at the state last evaluated; ``end``: START or END."""
     S, W = A[S_], A[W_]
     nr = S.rows.law.shape[0]
-    end = 0 if row == START_VALUES else 1
     for m in range(count_measured(S)):
         a = W.sensed.bias[m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
             a += W.G[e] * W.velocities.solved[S.column[e]]
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed.value[m], W.sensed.rate[m], a
-    store_levels(A, K, 0 if row == START_VALUES else K.levels.shape[0] - 1)
+    store_levels(A, K, 0 if end == START else K.levels.shape[0] - 1)
     renew_group(A)
-    evaluate_all_guards(A, W, A[OWN].real.t, K, row)
-    grain = START_ROUNDING if row == START_VALUES else END_ROUNDING
+    evaluate_all_guards(A, W, A[OWN].real.t, K, K.guards.start if end == START else K.guards.end)
+    rounding = K.guards.start_rounding if end == START else K.guards.end_rounding
     K.real.fastest = max(K.real.fastest, largest_measured_rate(S, W))
-    guard_rounding(S, W, A[OWN].real.t, A[INTERPOLATED].sensed, K.real.fastest, K.g[grain])
-    corner_tolerances(S, W, A[OWN].real.t, K.g[CORNER_DEPTHS])
+    guard_rounding(S, W, A[OWN].real.t, A[INTERPOLATED].sensed, K.real.fastest, rounding)
+    corner_tolerances(S, W, A[OWN].real.t, K.guards.corner_depth)
     last = K.grain.shape[0] - 1
     if S.guards.kind[last] == G_SHARED:
-        K.g[grain, last] = GROUP_ROUNDING * A[GROUP].size[0]
+        rounding[last] = GROUP_ROUNDING * A[GROUP].size[0]
     for i in range(K.grain.shape[0]):
-        K.g[grain, i] = max(K.g[grain, i], K.least[i])
-        K.grain[i] = K.g[grain, i] if K.nonnegative[i] == 1 else min(K.g[START_ROUNDING, i], K.g[grain, i])
+        rounding[i] = max(rounding[i], K.least[i])
+        K.grain[i] = rounding[i] if K.nonnegative[i] == 1 else min(K.guards.start_rounding[i], rounding[i])
 
 
 @formula
-def interpolated_guards(t, h, x, A, K, row):
-    """Evaluate guards from interpolated quantities at fraction x of the step that begins at t."""
+def interpolated_guards(t, h, x, A, K, out):
+    """Write the guards from interpolated quantities at fraction x of the step that begins at t to ``out``."""
     predict_sensed(K, x, h)
-    evaluate_all_guards(A, A[INTERPOLATED], t + x * h, K, row)
+    evaluate_all_guards(A, A[INTERPOLATED], t + x * h, K, out)
 
 
 @kernel

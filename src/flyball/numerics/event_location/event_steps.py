@@ -1,10 +1,11 @@
 """Steps that end on events: the first event in a step, and the callbacks of the `time_loop` for it.
 
 Guards are numbers that depend on time and state; an event is where one of them passes zero. Besides the
-callbacks of the loop there are ``watch(t, y, S, W, row)``, ``note(S, W, row)`` and ``look(t, h, x, S, W,
-row)``. They write guards to a row of ``W.g``: from the equations at a given state; at the state evaluated last,
-storing the quantities on which they depend; and predicted. W is a `GuardState`. The loop also returns when a step
-ends on events; the caller then changes the state, sets ``c.count.started`` to 0 and calls again.
+callbacks of the loop there are ``watch(t, y, S, W, out)``, ``note(S, W, end)`` and ``look(t, h, x, S, W, out)``.
+``watch`` and ``look`` write guards to ``out``: from the equations at a given state, and predicted. ``note`` stores
+those at the state evaluated last, an end of the step, with the quantities that they depend on. W is a `GuardState`.
+The loop also returns when a step ends on events; the caller then changes the state, sets ``c.count.started`` to 0
+and calls again.
 
 Where a guard may pass zero (`root_finding.find_crossing_interval`), the crossing is located with the equations,
 and the step is repeated. A last check is independent of the search: if a guard that must stay above zero is below
@@ -27,22 +28,11 @@ from ..integrators.time_loop import (
     write_output,
 )
 from .guards import (
-    CORNER_DEPTHS,
-    END_ROUNDING,
-    END_SLOPES,
-    END_VALUES,
+    END,
     EVENT_FOUND,
-    EXACT_VALUES,
-    HIGHEST_VALUES,
-    LOWEST_VALUES,
-    PREDICTED_VALUES,
     ROUNDING_FACTOR,
-    SIDES,
-    START_ROUNDING,
-    START_VALUES,
-    TRIGGER_VALUES,
+    START,
     UNKNOWN_SIDE,
-    ZERO_BANDS,
     compare_predictions,
     crossing_floor,
     evaluate_guards,
@@ -111,7 +101,7 @@ def end_on_first_event(callbacks, S, W, R, c):
             status, found = end_step_on_event(callbacks, S, W, R, c, x * h, slope, i, s, (W.real.beyond * h, most))
             if not found and W.count.cuts < MAX_BISECTIONS:  # the dense output was wrong
                 return STEP_CUT, 0.5 * h, False
-            if status == 0 and not found and s * W.g[END_VALUES, i] > 0.0:  # no event
+            if status == 0 and not found and s * W.guards.end[i] > 0.0:  # no event
                 break
         h = c.real.tried
         if status != 0:
@@ -125,7 +115,7 @@ def end_on_first_event(callbacks, S, W, R, c):
     if not hit and h == c.real.t_end - c.real.t:
         hit = mark_at_final_time(callbacks, S, W, R, c, h)
     if hit and c.count.extended > 0:  # other places were evaluated: restore the end
-        return watch(c.real.t + h, c.y.proposed, S, W, EXACT_VALUES), h, True
+        return watch(c.real.t + h, c.y.proposed, S, W, W.guards.exact), h, True
     return 0, h, hit
 
 
@@ -134,7 +124,7 @@ def begins_at_zero(W):
     """Whether a guard is zero as the step begins."""
     n = 0
     for i in range(W.way.shape[0]):
-        if W.g[START_VALUES, i] == 0.0 or W.side[i] == 0.0:
+        if W.guards.start[i] == 0.0 or W.side[i] == 0.0:
             n += 1
     return n > 0
 
@@ -150,7 +140,7 @@ def find_next_event(callbacks, S, W, R, c, h):
         i, a, b = find_crossing_interval(callbacks, S, W, R, c, h, at)
     skip = MIN_SKIP
     while i >= 0:
-        s = W.g[SIDES, i]
+        s = W.guards.search_side[i]
         status, x = locate_crossing(callbacks, S, W, R, c, h, i, a, b, s)
         if status != 0 or x > 0.0:
             return status, i, x, (s if triggers(W.way[i], s) else -s)
@@ -178,15 +168,15 @@ def find_missed_crossing(callbacks, S, W, R, c, h):
     """
     best, at, side, away = -1, 2.0, 0.0, 0
     for i in range(W.way.shape[0]):
-        f, s = W.g[END_VALUES, i], side_at_start(W, i)
-        if W.fired[i] == 1 or not W.g[START_VALUES, i] == W.g[START_VALUES, i]:
+        f, s = W.guards.end[i], side_at_start(W, i)
+        if W.fired[i] == 1 or not W.guards.start[i] == W.guards.start[i]:
             continue
-        if W.g[ZERO_BANDS, i] < 0.0 and s * f < -crossing_floor(W, i, 1.0) and triggers(W.way[i], s):
+        if W.guards.zero_band[i] < 0.0 and s * f < -crossing_floor(W, i, 1.0) and triggers(W.way[i], s):
             W.count.leaves_required_side = 0
             status, x = locate_crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
-        elif (W.nonnegative[i] == 1 and f < -allowed_depth(W, i)) or f < -W.g[CORNER_DEPTHS, i]:
+        elif (W.nonnegative[i] == 1 and f < -allowed_depth(W, i)) or f < -W.guards.corner_depth[i]:
             W.real.beyond = 0.0
-            least = allowed_depth(W, i) if W.nonnegative[i] == 1 else W.g[CORNER_DEPTHS, i]
+            least = allowed_depth(W, i) if W.nonnegative[i] == 1 else W.guards.corner_depth[i]
             status, _, x, s = bisect_violation(callbacks, S, W, R, c, h, i, 1.0, least)
         else:
             continue
@@ -221,12 +211,12 @@ def update_sides(callbacks, S, W, R, c, h, a, x):
 
     A guard that has left its side in between is an event.
     """
-    if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, PREDICTED_VALUES) != 0:
+    if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, W.guards.predicted) != 0:
         return EVALUATION_FAILED, -1, 0.0, 0.0
     best, at, side = -1, 2.0, 0.0
     for i in range(W.way.shape[0]):
-        f, s = W.g[PREDICTED_VALUES, i], W.g[SIDES, i]
-        if W.fired[i] == 1 or (W.nonnegative[i] == 1 and f <= 0.0 and W.g[ZERO_BANDS, i] >= 0.0):
+        f, s = W.guards.predicted[i], W.guards.search_side[i]
+        if W.fired[i] == 1 or (W.nonnegative[i] == 1 and f <= 0.0 and W.guards.zero_band[i] >= 0.0):
             continue
         if s * f < -crossing_floor(W, i, x) and triggers(W.way[i], s):
             status, z = locate_crossing(callbacks, S, W, R, c, h, i, a, x, s)
@@ -235,7 +225,7 @@ def update_sides(callbacks, S, W, R, c, h, a, x):
             if 0.0 < z < at:
                 best, at, side = i, z, s
         elif f == f and abs(f) > crossing_floor(W, i, x):
-            W.g[SIDES, i] = side_of(f)
+            W.guards.search_side[i] = side_of(f)
     return 0, best, at, side
 
 
@@ -248,30 +238,30 @@ def predicted_slope(callbacks, S, W, R, c, h, x, i):
     d = min(END_SLOPE_STEP, SLOPE_STEP_FRACTION * W.real.bracket, 0.25 * x)
     if x < MIN_SLOPE_PLACE:
         return 0.0
-    evaluate_guards(callbacks, S, W, R, c, h, x - 2.0 * d, PREDICTED_VALUES)
-    f = W.g[PREDICTED_VALUES, i]
-    evaluate_guards(callbacks, S, W, R, c, h, x - d, PREDICTED_VALUES)
-    return (W.g[PREDICTED_VALUES, i] - f) / (d * h)
+    evaluate_guards(callbacks, S, W, R, c, h, x - 2.0 * d, W.guards.predicted)
+    f = W.guards.predicted[i]
+    evaluate_guards(callbacks, S, W, R, c, h, x - d, W.guards.predicted)
+    return (W.guards.predicted[i] - f) / (d * h)
 
 
 @formula
 def end_slopes(callbacks, S, W, R, c, h):
-    """Write slopes of guards at the end of the step to W.g[END_SLOPES]; 0 if the change does not exceed rounding.
+    """Write slopes of guards at the end of the step to W.guards.end_slope; 0 if the change does not exceed rounding.
 
     If a guard changes only by rounding so close to the end, a larger difference is used.
     """
     back, asked = END_SLOPE_STEP, True
     for i in range(W.way.shape[0]):
-        W.g[END_SLOPES, i] = 0.0
+        W.guards.end_slope[i] = 0.0
     while asked and back <= 1.0:
-        evaluate_guards(callbacks, S, W, R, c, h, 1.0 - back, PREDICTED_VALUES)
+        evaluate_guards(callbacks, S, W, R, c, h, 1.0 - back, W.guards.predicted)
         asked = False
         for i in range(W.way.shape[0]):
-            if W.g[END_SLOPES, i] != 0.0:
+            if W.guards.end_slope[i] != 0.0:
                 continue
-            change = W.g[END_VALUES, i] - (W.g[PREDICTED_VALUES, i] if back < 1.0 else W.g[START_VALUES, i])
+            change = W.guards.end[i] - (W.guards.predicted[i] if back < 1.0 else W.guards.start[i])
             if W.nonnegative[i] == 1 or not abs(change) <= 2.0 * crossing_floor(W, i, 1.0):
-                W.g[END_SLOPES, i] = change / (back * h)
+                W.guards.end_slope[i] = change / (back * h)
             elif change != 0.0:
                 asked = True
         back *= SLOPE_STEP_GROWTH
@@ -284,7 +274,7 @@ def mark_simultaneous(callbacks, S, W, R, c, h, first):
     for i in range(W.way.shape[0]):
         if i == first:
             continue
-        f, slope = W.g[END_VALUES, i], W.g[END_SLOPES, i]
+        f, slope = W.guards.end[i], W.guards.end_slope[i]
         came = -1.0 if slope > 0.0 else 1.0  # the side from which it comes
         if triggers(W.way[i], came) and abs(f) <= W.real.same * abs(slope) and slope != 0.0:
             W.fired[i] = 1
@@ -299,7 +289,7 @@ def mark_at_final_time(callbacks, S, W, R, c, h):
     n = 0
     end_slopes(callbacks, S, W, R, c, h)
     for i in range(W.way.shape[0]):
-        f, s, slope = W.g[END_VALUES, i], W.g[SIDES, i], W.g[END_SLOPES, i]
+        f, s, slope = W.guards.end[i], W.guards.search_side[i], W.guards.end_slope[i]
         if W.nonnegative[i] == 1 or not f - f == 0.0:
             continue
         if triggers(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding_floor_with_time(W, c, i, slope, 1.0):
@@ -332,7 +322,7 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
     """
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     most = c.real.tried
-    note(S, W, END_VALUES)
+    note(S, W, END)
     note_state_drift(W, c)
     if c.inspection.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
         shorten_step(c, 0.5 * most)
@@ -374,12 +364,12 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
 @formula
 def evaluate_start_guards(watch, note, S, W, c):
     """Evaluate the guards, and what they depend on, at the start of the next step. Returns a status."""
-    status = watch(c.real.t, c.y.current, S, W, START_VALUES)
+    status = watch(c.real.t, c.y.current, S, W, W.guards.start)
     if status == 0:
-        note(S, W, START_VALUES)
+        note(S, W, START)
     for i in range(W.side.shape[0]):  # a guard that jumped since has no known side
-        f = W.side[i] * W.g[START_VALUES, i] + 2.0 * crossing_floor(W, i, 0.0)
-        if abs(W.side[i]) == 1.0 and not f >= 0.5 * abs(W.g[END_VALUES, i]):
+        f = W.side[i] * W.guards.start[i] + 2.0 * crossing_floor(W, i, 0.0)
+        if abs(W.side[i]) == 1.0 and not f >= 0.5 * abs(W.guards.end[i]):
             W.side[i] = UNKNOWN_SIDE
     return status
 
@@ -388,24 +378,23 @@ def evaluate_start_guards(watch, note, S, W, c):
 def set_sides_after_event(W, c, h):
     """Set the sides after a step that ends on an event: 0 for triggered guards; others if they exceed rounding.
 
-    So a guard that triggers soon after is not mistaken for one that has just triggered. W.g[ZERO_BANDS] holds the zero
-    band of each.
+    So a guard that triggers soon after is not mistaken for one that has just triggered. Their zero bands are stored.
     """
     for i in range(W.side.shape[0]):
-        f, s, slope = W.g[END_VALUES, i], side_at_start(W, i), (W.g[HIGHEST_VALUES, i] - W.g[LOWEST_VALUES, i]) / h
+        f, s, slope = W.guards.end[i], side_at_start(W, i), (W.guards.highest[i] - W.guards.lowest[i]) / h
         nothing = rounding_floor_with_time(W, c, i, slope, 1.0)
         W.side[i] = UNKNOWN_SIDE
         if W.fired[i] == 1:
-            W.side[i], W.g[TRIGGER_VALUES, i] = 0.0, abs(f)
+            W.side[i], W.guards.trigger[i] = 0.0, abs(f)
             if abs(f) <= TRIGGERED_ZERO_TOLERANCE * max(
-                abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i])
+                abs(W.guards.lowest[i]), abs(W.guards.highest[i])
             ):  # it did not jump
                 nothing = max(nothing, ROUNDING_FACTOR * abs(f))
         elif W.nonnegative[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
         elif W.nonnegative[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to cross, but has not yet
             W.side[i] = s if s != 0.0 else UNKNOWN_SIDE
-        W.g[ZERO_BANDS, i] = nothing
+        W.guards.zero_band[i] = nothing
 
 
 @formula
@@ -414,11 +403,13 @@ def shift_guards_to_start(W):
     W.count.fresh = 0
     for i in range(W.way.shape[0]):
         W.side[i] = (
-            0.0 if W.nonnegative[i] == 1 and abs(W.g[END_VALUES, i]) <= ROUNDING_FACTOR * W.grain[i] else W.g[SIDES, i]
+            0.0
+            if W.nonnegative[i] == 1 and abs(W.guards.end[i]) <= ROUNDING_FACTOR * W.grain[i]
+            else W.guards.search_side[i]
         )
-        W.g[START_VALUES, i], W.g[START_ROUNDING, i] = W.g[END_VALUES, i], W.g[END_ROUNDING, i]
+        W.guards.start[i], W.guards.start_rounding[i] = W.guards.end[i], W.guards.end_rounding[i]
     for i in range(W.way.shape[0], W.way.shape[0] + W.count.terms):
-        W.g[START_VALUES, i] = W.g[END_VALUES, i]
+        W.guards.start[i] = W.guards.end[i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):
             W.moving[0, k, m] = W.moving[1, k, m]

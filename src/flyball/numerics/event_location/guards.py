@@ -29,37 +29,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.formulas import formula
-from ...compiler.struct_layout import Float1, Float2, Float3, Int1, Int2, Record
+from ...compiler.struct_layout import Column, Float1, Float2, Float3, Int1, Int2, Record
 from ...errors import ModelError
 from ...math.scalar import sqrt
 from ..integrators.time_loop import INTERPOLATE, ULP
 
 # direction of a guard: which sign changes are events
 FALLING, EITHER, RISING = -1, 0, 1
-# rows of GuardState.g: guards at the start and end of the step; from the equations within the step; predicted within
-# the step; current sides during the search; zero bands of guards that begin near zero; values when they triggered;
-# rounding at the start and the end; smallest value, largest value and largest prediction error at stages; allowed
-# depth below zero of law corners, nan for other guards; slopes at the end; then values at the nodes of a subinterval,
-# and at its check places
-(
-    START_VALUES,
-    END_VALUES,
-    EXACT_VALUES,
-    PREDICTED_VALUES,
-    SIDES,
-    ZERO_BANDS,
-    TRIGGER_VALUES,
-    START_ROUNDING,
-    END_ROUNDING,
-    LOWEST_VALUES,
-    HIGHEST_VALUES,
-    PREDICTION_ERRORS,
-    CORNER_DEPTHS,
-    END_SLOPES,
-    NODE_VALUES,
-) = range(15)
+START, END = range(2)  # of the step, in `GuardState.moving`
 NODES, CHECK_NODES = 8, 2
-GUARD_ROWS = NODE_VALUES + NODES + CHECK_NODES
 CHECK_PLACES = (0.131, 0.567)  # places in a subinterval; halving it does not map them onto each other
 UNKNOWN_SIDE = 2.0  # the side is taken from the value where the next step begins
 EVENT_FOUND = 6  # status besides those of StepState: the step ends on events, marked in GuardState.fired
@@ -98,6 +76,25 @@ class GuardCounts(Record, kind="Int"):
     short_step: int  # whether the step is so short that rates are more accurate than differences of values
 
 
+class GuardValues(Record, kind="Float", vectors=True):
+    """Numbers of the guards, followed by those of the terms of a group [(ng + terms,)]."""
+
+    start: Float1  # values at the start of the step
+    end: Float1
+    exact: Float1  # from the equations within the step
+    predicted: Float1  # within the step
+    search_side: Column  # current side during the search
+    zero_band: Column  # of guards that begin near zero; -1 of others
+    trigger: Column  # size when they triggered
+    start_rounding: Float1
+    end_rounding: Float1
+    lowest: Column  # smallest value at stages
+    highest: Column
+    prediction_error: Column  # largest there
+    corner_depth: Float1  # allowed depth below zero of corners of laws; nan of other guards
+    end_slope: Column
+
+
 class GuardState(NamedTuple):
     """Workspace of event detection, besides the StepState."""
 
@@ -110,7 +107,8 @@ class GuardState(NamedTuple):
     still: Float1  # (nm,): scale of rates that constraints keep at zero; else 0
     side: Float1  # (ng,): 1 above zero, -1 below; 0 at the start of a segment if the guard has just triggered
     fired: Int1  # (ng,): 1 for guards that end the step
-    g: Float2  # (GUARD_ROWS, ng + terms of a group)
+    guards: GuardValues
+    node_values: Float2  # (NODES + CHECK_NODES, ng + terms): at the nodes and check places of a subinterval
     polynomial: Float1  # (NODES,): power coefficients of a guard over a subinterval
     basis: Float2  # (NODES, NODES): power coefficients from values at the nodes
     nodes: Float1  # (NODES + CHECK_NODES,): places in a subinterval
@@ -217,8 +215,9 @@ def allocate_guard_state(
     real.latest = -np.inf
     kept, met = (np.array(x, np.int64) for x in sampled_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
-    g = np.full((GUARD_ROWS, ng + terms), np.nan)
-    g[START_ROUNDING : END_ROUNDING + 1] = 0.0
+    guards = GuardValues.blank(ng + terms)
+    guards[:] = np.nan
+    guards.start_rounding = guards.end_rounding = 0.0
     return GuardState(
         way=np.array(way, np.int64),
         nonnegative=(np.asarray(holding) > 0).astype(np.int64),
@@ -229,7 +228,8 @@ def allocate_guard_state(
         still=np.zeros(measured),
         side=np.full(ng, UNKNOWN_SIDE),
         fired=np.zeros(ng, np.int64),
-        g=g,
+        guards=guards,
+        node_values=np.full((NODES + CHECK_NODES, ng + terms), np.nan),
         polynomial=np.zeros(NODES),
         basis=power_basis(),
         nodes=np.r_[chebyshev_nodes(), CHECK_PLACES],
@@ -263,10 +263,10 @@ def terms_confirmed(W):
     if W.count.terms == 0:
         return True
     last = W.way.shape[0] - 1
-    near = DISTANCE_TOLERANCE * W.g[LOWEST_VALUES, last]
+    near = DISTANCE_TOLERANCE * W.guards.lowest[last]
     for k in range(W.count.terms):
         i = last + 1 + k
-        low, high, miss = W.g[LOWEST_VALUES, i], W.g[HIGHEST_VALUES, i], W.g[PREDICTION_ERRORS, i]
+        low, high, miss = W.guards.lowest[i], W.guards.highest[i], W.guards.prediction_error[i]
         if (
             miss
             > max(near, POLYNOMIAL_TOLERANCE * (high - low))
@@ -283,14 +283,14 @@ def group_may_dip(W):
     last, n = W.way.shape[0] - 1, W.count.terms
     if n == 0:
         return False
-    least = W.g[NODE_VALUES, last]
+    least = W.node_values[0, last]
     for j in range(1, NODES + CHECK_NODES):
-        least = min(least, W.g[NODE_VALUES + j, last])
+        least = min(least, W.node_values[j, last])
     for k in range(n):
         if not is_polynomial(W, last + 1 + k, DISTANCE_TOLERANCE * least):
             return True
     for j in range(1, NODES):
-        f, g = W.g[NODE_VALUES + j - 1, last], W.g[NODE_VALUES + j, last]
+        f, g = W.node_values[j - 1, last], W.node_values[j, last]
         if f < 0.0 or g < 0.0 or f != f or g != g:
             continue
         sag = CURVATURE_SAFETY * (W.nodes[j] - W.nodes[j - 1]) ** 2 * largest_curvature(W, j, last + 1, n)
@@ -302,18 +302,18 @@ def group_may_dip(W):
 @formula
 def is_polynomial(W, i, near):
     """Whether the polynomial through the nodes represents a term within the tolerance."""
-    low, high = W.g[NODE_VALUES, i], W.g[NODE_VALUES, i]
+    low, high = W.node_values[0, i], W.node_values[0, i]
     for j in range(1, NODES + CHECK_NODES):
-        low, high = min(low, W.g[NODE_VALUES + j, i]), max(high, W.g[NODE_VALUES + j, i])
+        low, high = min(low, W.node_values[j, i]), max(high, W.node_values[j, i])
     allowed = (
         max(near, POLYNOMIAL_TOLERANCE * (high - low))
         + SIZE_ROUNDING * max(abs(low), abs(high))
         + ROUNDING_FACTOR * W.grain[W.way.shape[0] - 1]
     )
     for j in range(CHECK_NODES):
-        f = W.g[NODE_VALUES + NODES + j, i]
+        f = W.node_values[NODES + j, i]
         for k in range(NODES):
-            f -= W.checks[j, k] * W.g[NODE_VALUES + k, i]
+            f -= W.checks[j, k] * W.node_values[k, i]
         if not abs(f) <= allowed:
             return False
     return True
@@ -338,7 +338,7 @@ def largest_curvature(W, j, first, n):
 def second_difference(W, m, i):
     """Second divided difference of column i at nodes m - 2, m - 1, m."""
     x, y, z = W.nodes[m - 2], W.nodes[m - 1], W.nodes[m]
-    f, g, e = W.g[NODE_VALUES + m - 2, i], W.g[NODE_VALUES + m - 1, i], W.g[NODE_VALUES + m, i]
+    f, g, e = W.node_values[m - 2, i], W.node_values[m - 1, i], W.node_values[m, i]
     return ((e - g) / (z - y) - (g - f) / (y - x)) / (z - x)
 
 
@@ -356,7 +356,7 @@ def note_state_drift(W, c):
 @formula
 def is_law_corner(W, i):
     """Whether guard i is that of a nonsmooth point of a law; only these have an allowed depth (not nan)."""
-    return W.g[CORNER_DEPTHS, i] == W.g[CORNER_DEPTHS, i]
+    return W.guards.corner_depth[i] == W.guards.corner_depth[i]
 
 
 @formula
@@ -370,7 +370,7 @@ def rounding_floor(W, i, x):
     """Return the rounding error of guard i at a fraction x of the step."""
     if W.nonnegative[i] == 1 or is_law_corner(W, i):
         return ROUNDING_FACTOR * W.grain[i]
-    return W.real.drift * ((1.0 - x) * W.g[START_ROUNDING, i] + x * W.g[END_ROUNDING, i])
+    return W.real.drift * ((1.0 - x) * W.guards.start_rounding[i] + x * W.guards.end_rounding[i])
 
 
 @formula
@@ -382,7 +382,7 @@ def rounding_floor_with_time(W, c, i, slope, x):
 @formula
 def side_at_start(W, i):
     """Side of guard i at the start of the step: the last one beyond rounding; 0 if there was none."""
-    f = W.g[START_VALUES, i]
+    f = W.guards.start[i]
     if abs(f) > crossing_floor(W, i, 0.0):
         return 1.0 if f > 0.0 else -1.0
     return W.side[i] if abs(W.side[i]) == 1.0 else 0.0
@@ -392,7 +392,7 @@ def side_at_start(W, i):
 def has_left_side(W, i, s, f, x):
     """Whether guard i has left side s where its value is f: beyond rounding, or newly at zero."""
     return s * f < -crossing_floor(W, i, x) or (
-        f == 0.0 and max(s * W.g[LOWEST_VALUES, i], s * W.g[HIGHEST_VALUES, i]) > crossing_floor(W, i, x)
+        f == 0.0 and max(s * W.guards.lowest[i], s * W.guards.highest[i]) > crossing_floor(W, i, x)
     )
 
 
@@ -452,17 +452,17 @@ SHORT_STEP_FRACTION = 1e-7  # part of the time span; shorter steps contain no ev
 
 
 @formula
-def evaluate_guards(callbacks, S, W, R, c, h, x, row):
+def evaluate_guards(callbacks, S, W, R, c, h, x, out):
     """Write the guards at a fraction x of the step to a row."""
     W.count.looks += 1
     if W.count.predictions_agree == 1:
-        callbacks[7](c.real.t, h, x, S, W, row)
-    elif evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row) != 0:
+        callbacks[7](c.real.t, h, x, S, W, out)
+    elif evaluate_guards_exactly(callbacks, S, W, R, c, h, x, out) != 0:
         W.count.lost = 1
 
 
 @formula
-def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row):
+def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, out):
     """Write the guards from the equations on the dense output, at a fraction x, to a row. Returns a status."""
     ask, own, watch = callbacks[0], callbacks[1], callbacks[5]
     c.real.part = x
@@ -470,19 +470,19 @@ def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row):
         return 1
     W.count.exact_looks += 1
     W.count.all_exact_looks += 1
-    return watch(c.real.t + x * h, c.y.interpolated, S, W, row)
+    return watch(c.real.t + x * h, c.y.interpolated, S, W, out)
 
 
 @formula
 def exact_guard(callbacks, S, W, R, c, h, x, i):
     """Evaluate guard i on the dense output at a fraction x of the step. Returns (status, value)."""
     if x <= 0.0:
-        return 0, W.g[START_VALUES, i]
+        return 0, W.guards.start[i]
     if x >= 1.0:
-        return 0, W.g[END_VALUES, i]
-    if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, EXACT_VALUES) != 0:
+        return 0, W.guards.end[i]
+    if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, W.guards.exact) != 0:
         return 1, 0.0
-    return 0, W.g[EXACT_VALUES, i]
+    return 0, W.guards.exact[i]
 
 
 @formula
@@ -494,25 +494,25 @@ def compare_predictions(predict, S, W, t, h, span):
     W.count.short_step = 1 if h <= SHORT_STEP_FRACTION * span else 0
     every = ng + W.count.terms
     for i in range(every):
-        W.g[LOWEST_VALUES, i] = min(W.g[START_VALUES, i], W.g[END_VALUES, i])
-        W.g[HIGHEST_VALUES, i] = max(W.g[START_VALUES, i], W.g[END_VALUES, i])
-        W.g[PREDICTION_ERRORS, i] = 0.0
+        W.guards.lowest[i] = min(W.guards.start[i], W.guards.end[i])
+        W.guards.highest[i] = max(W.guards.start[i], W.guards.end[i])
+        W.guards.prediction_error[i] = 0.0
     for j in range(W.compared_stages.shape[0]):
-        predict(t, h, W.compared_places[j], S, W, PREDICTED_VALUES)
+        predict(t, h, W.compared_places[j], S, W, W.guards.predicted)
         for i in range(every):
-            f, g = W.compared_values[j, i], W.g[PREDICTED_VALUES, i]
+            f, g = W.compared_values[j, i], W.guards.predicted[i]
             if f == g or (f != f and g != g):
                 continue
             if not f - g == f - g:  # one is finite, the other is not
                 W.count.predictions_agree = 0
-            W.g[LOWEST_VALUES, i] = min(W.g[LOWEST_VALUES, i], f, g)
-            W.g[HIGHEST_VALUES, i] = max(W.g[HIGHEST_VALUES, i], f, g)
-            W.g[PREDICTION_ERRORS, i] = max(W.g[PREDICTION_ERRORS, i], abs(f - g))
+            W.guards.lowest[i] = min(W.guards.lowest[i], f, g)
+            W.guards.highest[i] = max(W.guards.highest[i], f, g)
+            W.guards.prediction_error[i] = max(W.guards.prediction_error[i], abs(f - g))
     if W.count.short_step == 1:
         W.count.predictions_agree = 1
         return
     for i in range(ng):
-        low, high, miss = W.g[LOWEST_VALUES, i], W.g[HIGHEST_VALUES, i], W.g[PREDICTION_ERRORS, i]
+        low, high, miss = W.guards.lowest[i], W.guards.highest[i], W.guards.prediction_error[i]
         if miss == 0.0 or miss <= POLYNOMIAL_TOLERANCE * (high - low) + SIZE_ROUNDING * max(abs(low), abs(high)) + min(
             rounding_floor(W, i, 0.0), rounding_floor(W, i, 1.0)
         ):

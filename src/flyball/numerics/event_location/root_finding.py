@@ -2,7 +2,7 @@
 
 A step is searched in subintervals. In each the guards are a polynomial through their values at eight nodes. Two
 more places check it; if it does not fit, the subinterval is halved. `guards.evaluate_guards` writes the guards at
-t + x h to a row of ``W.g``.
+t + x h to an array.
 
 Where a guard may pass zero, the sign change is bracketed on the dense output, or shown not to exist. Then the
 step is repeated with a width from the secant method until it ends on the event. The event time is therefore as
@@ -15,20 +15,12 @@ from ...compiler.formulas import formula
 from ..integrators.time_loop import TRY_STEP, ULP
 from .guards import (
     CHECK_NODES,
-    END_VALUES,
-    HIGHEST_VALUES,
-    LOWEST_VALUES,
-    NODE_VALUES,
+    END,
     NODES,
     POLYNOMIAL_TOLERANCE,
-    PREDICTED_VALUES,
     ROUNDING_FACTOR,
-    SIDES,
     SIZE_ROUNDING,
-    START_VALUES,
     TIME_RESOLUTION,
-    TRIGGER_VALUES,
-    ZERO_BANDS,
     crossing_floor,
     evaluate_guards,
     exact_guard,
@@ -63,8 +55,8 @@ START_ZERO_TOLERANCE = 1e-12  # relative size within which any other guard count
 def find_crossing_interval(callbacks, S, W, R, c, h, first):
     """Find the first interval after ``first`` in which a guard passes or approaches zero: (guard or -1, from, to).
 
-    From and to are parts of the step. The search continues with the sides in W.g[SIDES]. W.real.searched_to is 1, or
-    the place where the search stopped.
+    From and to are parts of the step. The search continues with the sides in W.guards.search_side.
+    W.real.searched_to is 1, or the place where the search stopped.
     """
     a = first
     w = 1.0 - first
@@ -107,12 +99,11 @@ def evaluate_subinterval(callbacks, S, W, R, c, h, a, w):
     """Write the guards at the nodes and check places of a subinterval; values at the ends of the step are known."""
     for j in range(NODES + CHECK_NODES):
         x = a + w * W.nodes[j]
-        row = NODE_VALUES + j
         if x <= 0.0 or x >= 1.0:
             for i in range(W.way.shape[0] + W.count.terms):
-                W.g[row, i] = W.g[START_VALUES if x <= 0.0 else END_VALUES, i]
+                W.node_values[j, i] = W.guards.start[i] if x <= 0.0 else W.guards.end[i]
         else:
-            evaluate_guards(callbacks, S, W, R, c, h, x, row)
+            evaluate_guards(callbacks, S, W, R, c, h, x, W.node_values[j])
 
 
 @formula
@@ -129,9 +120,9 @@ def subinterval_resolved(W):
         odd = NEAR_ZERO_TOLERANCE if may_cross_between_nodes(W, i) else POLYNOMIAL_TOLERANCE
         allowed = odd * (high - low) + SIZE_ROUNDING * max(abs(low), abs(high)) + subinterval_floor(W, i)
         for j in range(CHECK_NODES):
-            f = W.g[NODE_VALUES + NODES + j, i]
+            f = W.node_values[NODES + j, i]
             for k in range(NODES):
-                f -= W.checks[j, k] * W.g[NODE_VALUES + k, i]
+                f -= W.checks[j, k] * W.node_values[k, i]
             if not abs(f) <= allowed:
                 return False
     return not group_may_dip(W)
@@ -142,11 +133,9 @@ def may_cross_between_nodes(W, i):
     """Whether a guard may cross zero twice between two nodes: its slope allows a change by the sum of both."""
     steepest = 0.0
     for j in range(1, NODES):
-        steepest = max(
-            steepest, abs(W.g[NODE_VALUES + j, i] - W.g[NODE_VALUES + j - 1, i]) / (W.nodes[j] - W.nodes[j - 1])
-        )
+        steepest = max(steepest, abs(W.node_values[j, i] - W.node_values[j - 1, i]) / (W.nodes[j] - W.nodes[j - 1]))
     for j in range(1, NODES):
-        f, g = W.g[NODE_VALUES + j - 1, i], W.g[NODE_VALUES + j, i]
+        f, g = W.node_values[j - 1, i], W.node_values[j, i]
         near = abs(f) + abs(g) <= SLOPE_SAFETY * steepest * (W.nodes[j] - W.nodes[j - 1])
         if near and f * g > 0.0 and triggers(W.way[i], side_of(f)):
             return True
@@ -156,10 +145,10 @@ def may_cross_between_nodes(W, i):
 @formula
 def value_range(W, i):
     """Smallest and largest value of a guard in the subinterval; both nan if it is nan somewhere."""
-    low = W.g[NODE_VALUES, i]
+    low = W.node_values[0, i]
     high = low
     for j in range(1, NODES + CHECK_NODES):
-        f = W.g[NODE_VALUES + j, i]
+        f = W.node_values[j, i]
         if f != f:
             return f, f
         low = min(low, f)
@@ -178,15 +167,15 @@ def may_cross(W, i):
     """Whether a guard comes near zero in the subinterval. Otherwise its side is set to that of its values."""
     low, high = value_range(W, i)
     if not both_finite(low, high):  # not defined, or not everywhere
-        return both_finite(W.g[NODE_VALUES, i], 0.0) or both_finite(W.g[NODE_VALUES + NODES - 1, i], 0.0)
+        return both_finite(W.node_values[0, i], 0.0) or both_finite(W.node_values[NODES - 1, i], 0.0)
     if max(abs(low), abs(high)) < ZERO_GUARD + (0.0 if is_law_corner(W, i) else subinterval_floor(W, i)):
         return False
     most = QUIET_DISTANCE * (high - low)
-    if low > most and W.g[SIDES, i] >= 0.0:
-        W.g[SIDES, i] = 1.0
+    if low > most and W.guards.search_side[i] >= 0.0:
+        W.guards.search_side[i] = 1.0
         return False
-    if high < -most and W.g[SIDES, i] <= 0.0:
-        W.g[SIDES, i] = -1.0
+    if high < -most and W.guards.search_side[i] <= 0.0:
+        W.guards.search_side[i] = -1.0
         return False
     return True
 
@@ -217,51 +206,51 @@ def crossing_of_polynomial(W, i):
         return crossing_at_nodes(W, i)
     polynomial_coefficients(W, i)
     graze = GRAZING_DISTANCE * (high - low)
-    s = W.g[SIDES, i]
+    s = W.guards.search_side[i]
     _, d = polynomial_value(W, 0.0)
     for n in range(SLOPE_SAMPLES):
         x = n / SLOPE_SAMPLES
         y = (n + 1.0) / SLOPE_SAMPLES
         f1, d1 = polynomial_value(W, y)
         if n == SLOPE_SAMPLES - 1:
-            f1 = W.g[NODE_VALUES + NODES - 1, i]
+            f1 = W.node_values[NODES - 1, i]
         if s * d < 0.0 and s * d1 >= 0.0:  # it approaches zero and then recedes
             z = x + (y - x) * d / (d - d1)
             fz, _ = polynomial_value(W, z)
             left = has_left_side(W, i, s, fz, place_in_step(W, z)) and triggers(W.way[i], s)
             if left or (s * fz <= graze and s * f1 > 0.0):
-                W.g[SIDES, i] = s
+                W.guards.search_side[i] = s
                 return x, z if left else y
         if s != 0.0 and has_left_side(W, i, s, f1, place_in_step(W, y)) and (f1 != 0.0 or triggers(W.way[i], s)):
             if triggers(W.way[i], s):
-                W.g[SIDES, i] = s
+                W.guards.search_side[i] = s
                 return x, y
             s = side_of(f1)
-        elif s == 0.0 and (f1 if W.nonnegative[i] == 1 else abs(f1)) > W.g[ZERO_BANDS, i]:
+        elif s == 0.0 and (f1 if W.nonnegative[i] == 1 else abs(f1)) > W.guards.zero_band[i]:
             s = side_of(f1)
         d = d1
-    W.g[SIDES, i] = s
+    W.guards.search_side[i] = s
     return 0.0, -1.0
 
 
 @formula
 def crossing_at_nodes(W, i):
     """Find the crossing as `crossing_of_polynomial`, from values at the nodes, for an unresolved guard."""
-    s = W.g[SIDES, i]
+    s = W.guards.search_side[i]
     for j in range(1, NODES):
-        f = W.g[NODE_VALUES + j, i]
+        f = W.node_values[j, i]
         if f != f:
             s = 0.0
         elif (
             s != 0.0 and has_left_side(W, i, s, f, place_in_step(W, W.nodes[j])) and (f != 0.0 or triggers(W.way[i], s))
         ):
             if triggers(W.way[i], s):
-                W.g[SIDES, i] = s
+                W.guards.search_side[i] = s
                 return W.nodes[j - 1], W.nodes[j]
             s = side_of(f)
-        elif s == 0.0 and (f if W.nonnegative[i] == 1 else abs(f)) > W.g[ZERO_BANDS, i]:
+        elif s == 0.0 and (f if W.nonnegative[i] == 1 else abs(f)) > W.guards.zero_band[i]:
             s = side_of(f)
-    W.g[SIDES, i] = s
+    W.guards.search_side[i] = s
     return 0.0, -1.0
 
 
@@ -277,7 +266,7 @@ def polynomial_coefficients(W, i):
     for p in range(NODES):
         s = 0.0
         for j in range(NODES):
-            s += W.basis[p, j] * W.g[NODE_VALUES + j, i]
+            s += W.basis[p, j] * W.node_values[j, i]
         W.polynomial[p] = s
 
 
@@ -304,15 +293,15 @@ def find_start_sides(callbacks, S, W, R, c, h):
     W.count.leaves_required_side = 0
     if W.count.fresh == 0 and not has_doubtful_side(W):
         for i in range(ng):
-            W.g[SIDES, i] = W.side[i]
-            W.g[ZERO_BANDS, i] = rounding_floor(W, i, 0.0) if W.side[i] == 0.0 and W.nonnegative[i] == 0 else -1.0
+            W.guards.search_side[i] = W.side[i]
+            W.guards.zero_band[i] = rounding_floor(W, i, 0.0) if W.side[i] == 0.0 and W.nonnegative[i] == 0 else -1.0
         return -1, 0.0, 0.0, 0.0
     if not mark_zero_starts(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0
     before = 0.0
     for n in range(CLOSEST_START_POWER, FARTHEST_START_POWER - 1, -1):
         x = 0.5**n
-        look(t, h, x, S, W, PREDICTED_VALUES)
+        look(t, h, x, S, W, W.guards.predicted)
         W.count.looks += 1
         i = leaves_start_side(W, 0)
         while i >= 0 and W.count.leaves_required_side == 1:  # check with the equations: interpolation is less accurate
@@ -334,41 +323,41 @@ def has_doubtful_side(W):
     """Whether a guard that must stay above zero has been about zero since the start of the segment."""
     n = 0
     for i in range(W.way.shape[0]):
-        if W.nonnegative[i] == 1 and W.side[i] <= 0.0 and W.g[START_VALUES, i] == W.g[START_VALUES, i]:
+        if W.nonnegative[i] == 1 and W.side[i] <= 0.0 and W.guards.start[i] == W.guards.start[i]:
             n += 1
     return n > 0
 
 
 @formula
 def mark_zero_starts(callbacks, S, W, R, c, h):
-    """Write zero bands of guards that begin near zero to W.g[ZERO_BANDS], else -1; returns if there are any."""
+    """Write zero bands of guards that begin near zero to W.guards.zero_band, else -1; returns if there are any."""
     evaluate_subinterval(callbacks, S, W, R, c, h, 0.0, 1.0)
     first = min(1.0, max(START_SLOPE_STEP, 4.0 * TIME_RESOLUTION * max(abs(c.real.t), c.real.largest) / h))
-    callbacks[7](c.real.t, h, first, S, W, PREDICTED_VALUES)
+    callbacks[7](c.real.t, h, first, S, W, W.guards.predicted)
     near = False
     for i in range(W.way.shape[0]):
         low, high = value_range(W, i)
         fresh = W.count.fresh == 1 and (W.nonnegative[i] == 1 or abs(W.side[i]) != 1.0)
-        W.g[SIDES, i] = side_of(W.g[START_VALUES, i]) if fresh else W.side[i]
-        W.g[ZERO_BANDS, i] = -1.0
+        W.guards.search_side[i] = side_of(W.guards.start[i]) if fresh else W.side[i]
+        W.guards.zero_band[i] = -1.0
         if not fresh and (W.count.fresh == 1 or not (W.nonnegative[i] == 1 and W.side[i] <= 0.0)):
             continue
         size = max(abs(low), abs(high))
-        now = abs(W.g[START_VALUES, i])
+        now = abs(W.guards.start[i])
         just = W.side[i] == 0.0
-        below = W.nonnegative[i] == 1 and W.g[START_VALUES, i] < 0.0
+        below = W.nonnegative[i] == 1 and W.guards.start[i] < 0.0
         nothing = 0.0
         if W.nonnegative[i] == 0 and both_finite(low, high):
-            slope = min(high - low, abs(W.g[PREDICTED_VALUES, i] - W.g[START_VALUES, i]) / first) / h
+            slope = min(high - low, abs(W.guards.predicted[i] - W.guards.start[i]) / first) / h
             nothing = max(
-                rounding_floor_with_time(W, c, i, slope, 0.0), ROUNDING_FACTOR * W.g[TRIGGER_VALUES, i] if just else 0.0
+                rounding_floor_with_time(W, c, i, slope, 0.0), ROUNDING_FACTOR * W.guards.trigger[i] if just else 0.0
             )
         if both_finite(low, high) and (
             below or now <= max((TRIGGERED_ZERO_TOLERANCE if just else START_ZERO_TOLERANCE) * size, nothing)
         ):
-            W.g[SIDES, i] = 0.0
+            W.guards.search_side[i] = 0.0
             mark = allowed_depth_factor(W, i) * now if just or below else START_ZERO_TOLERANCE * size
-            W.g[ZERO_BANDS, i] = max(mark, W.nonnegative[i] * ROUNDING_FACTOR * W.grain[i], nothing)
+            W.guards.zero_band[i] = max(mark, W.nonnegative[i] * ROUNDING_FACTOR * W.grain[i], nothing)
             near = True
     return near
 
@@ -377,20 +366,20 @@ def mark_zero_starts(callbacks, S, W, R, c, h):
 def leaves_start_side(W, first):
     """Return the first guard from ``first`` on that leaves its side near the start, by the predicted values; or -1."""
     for i in range(first, W.way.shape[0]):
-        f = W.g[PREDICTED_VALUES, i]
-        s = W.g[SIDES, i]
-        if W.g[ZERO_BANDS, i] < 0.0 or W.fired[i] != 0:
+        f = W.guards.predicted[i]
+        s = W.guards.search_side[i]
+        if W.guards.zero_band[i] < 0.0 or W.fired[i] != 0:
             continue
         if W.nonnegative[i] == 1 and s <= 0.0 and f < -allowed_depth(W, i):
             W.count.leaves_required_side = 1
             return i
         if s == 0.0:
-            if abs(f) > W.g[ZERO_BANDS, i]:
-                W.g[SIDES, i] = side_of(f)
+            if abs(f) > W.guards.zero_band[i]:
+                W.guards.search_side[i] = side_of(f)
         elif s * f < -crossing_floor(W, i, 0.0):
             if triggers(W.way[i], s):
                 return i
-            W.g[SIDES, i] = side_of(f)
+            W.guards.search_side[i] = side_of(f)
     return -1
 
 
@@ -399,7 +388,7 @@ def has_undecided_side(W):
     """Whether a guard that begins about zero has no side yet, or must be followed to the end of the search."""
     n = 0
     for i in range(W.way.shape[0]):
-        if W.g[ZERO_BANDS, i] >= 0.0 and (W.g[SIDES, i] == 0.0 or W.nonnegative[i] == 1):
+        if W.guards.zero_band[i] >= 0.0 and (W.guards.search_side[i] == 0.0 or W.nonnegative[i] == 1):
             n += 1
     return n > 0
 
@@ -407,12 +396,12 @@ def has_undecided_side(W):
 @formula
 def allowed_depth(W, i):
     """Depth below zero that rounding allows for a guard that must stay above zero."""
-    size = max(abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i]))
+    size = max(abs(W.guards.lowest[i]), abs(W.guards.highest[i]))
     return max(
-        W.g[ZERO_BANDS, i],
+        W.guards.zero_band[i],
         START_ZERO_TOLERANCE * size,
         ROUNDING_FACTOR * W.grain[i],
-        allowed_depth_factor(W, i) * -W.g[START_VALUES, i],
+        allowed_depth_factor(W, i) * -W.guards.start[i],
     )
 
 
@@ -453,7 +442,7 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
         status, fa = exact_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
-    if a <= 0.0 and W.nonnegative[i] == 0 and abs(fa) <= W.g[ZERO_BANDS, i]:
+    if a <= 0.0 and W.nonnegative[i] == 0 and abs(fa) <= W.guards.zero_band[i]:
         fa = 0.0  # rounding: on no side
     elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < crossing_floor(W, i, 0.0):
         status, fb = exact_guard(callbacks, S, W, R, c, h, last, i)  # the previous step ended next to it
@@ -480,8 +469,8 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
         and not (fb == 0.0 and s * fa > crossing_floor(W, i, a))
     ):
         return 0, -1.0  # it reaches zero without passing it
-    begun = W.nonnegative[i] == 0 and abs(W.g[START_VALUES, i]) <= W.g[ZERO_BANDS, i]  # about zero, on no side
-    if a > 0.0 and (begun or W.g[START_VALUES, i] * fa < 0.0):
+    begun = W.nonnegative[i] == 0 and abs(W.guards.start[i]) <= W.guards.zero_band[i]  # about zero, on no side
+    if a > 0.0 and (begun or W.guards.start[i] * fa < 0.0):
         W.real.beyond = a
     W.real.bracket = b - a
     status, x = refine_root(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
@@ -581,7 +570,7 @@ def retake_step(callbacks, S, W, R, c, h):
     c.real.tried = h
     status = ask(own, S, W, R, c, TRY_STEP)
     if status == 0:
-        note(S, W, END_VALUES)
+        note(S, W, END)
     return status
 
 
@@ -603,7 +592,7 @@ def end_step_on_event(callbacks, S, W, R, c, h, slope, i, s, between):
     status, done = 0, False
     for n in range(MAX_RETAKES):
         status = retake_step(callbacks, S, W, R, c, h)
-        f = W.g[END_VALUES, i]
+        f = W.guards.end[i]
         if status != 0 or f == 0.0 or done:
             break
         leap = False
@@ -629,7 +618,7 @@ def end_step_on_event(callbacks, S, W, R, c, h, slope, i, s, between):
         else:
             h = bisected_width(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
-    f = W.g[END_VALUES, i]
+    f = W.guards.end[i]
     there = abs(f) <= max(END_VALUE_FACTOR * near * abs(slope), rounding_floor(W, i, 1.0))
     found = there or (not s * f > 0.0 and (not least > 0.0 or bound or done))
     return status, found

@@ -36,13 +36,9 @@ from ...laws.python_functions import clear_faults, deferred_interrupts
 from ...numerics.complementarity.interior_point import UNKNOWN_COUNT
 from ...numerics.event_location.guards import (
     CHECK_NODES,
-    END_ROUNDING,
-    END_VALUES,
     EVENT_FOUND,
     NODES,
-    TRIGGER_VALUES,
     UNKNOWN_SIDE,
-    ZERO_BANDS,
 )
 from ...numerics.integrators import time_loop as ex
 from ...numerics.integrators.butcher_tableaux import tableau
@@ -159,14 +155,14 @@ def guard_check_remark(loop: GuardedLoop) -> str:
 def note_fired_zeros(here: EventContext, loop: GuardedLoop) -> None:
     """Store the rounding of event expressions where a step ended on events, and the values of those that triggered."""
     events, guard_state = here.structure.events, loop.guard_state
-    here.nothing = {g: float(guard_state.g[ZERO_BANDS, g]) for g in events}
-    here.zero |= {events[g].name: float(guard_state.g[TRIGGER_VALUES, g]) for g in loop.fired if g in events}
+    here.nothing = {g: float(guard_state.guards.zero_band[g]) for g in events}
+    here.zero |= {events[g].name: float(guard_state.guards.trigger[g]) for g in loop.fired if g in events}
 
 
 def note_rounding_zeros(here: EventContext, loop: GuardedLoop) -> None:
     """Store the rounding of event expressions where a step ended at a time at which forces jump."""
     here.nothing = {
-        g: float(loop.guard_state.real.drift * loop.guard_state.g[END_ROUNDING, g]) for g in here.structure.events
+        g: float(loop.guard_state.real.drift * loop.guard_state.guards.end_rounding[g]) for g in here.structure.events
     }
 
 
@@ -174,7 +170,7 @@ def save_final_signs(here: EventContext, loop: GuardedLoop) -> None:
     """Store the last signs of event expressions that are zero to rounding at the end of the motion."""
     guard_state, here.final_signs = loop.guard_state, {}
     for g, e in here.structure.events.items():
-        near = abs(guard_state.g[END_VALUES, g]) <= guard_state.real.drift * guard_state.g[END_ROUNDING, g]
+        near = abs(guard_state.guards.end[g]) <= guard_state.real.drift * guard_state.guards.end_rounding[g]
         if near and abs(guard_state.side[g]) == 1.0:
             here.final_signs[e.name] = float(guard_state.side[g])
 
@@ -191,7 +187,7 @@ def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
         guard_state.side[g] = (
             0.0 if e.name in told else here.final_signs.get(e.name) or np.sign(values[g]) or UNKNOWN_SIDE
         )
-        guard_state.g[END_VALUES, g], guard_state.g[TRIGGER_VALUES, g] = values[g], here.zero.get(e.name, 0.0)
+        guard_state.guards.end[g], guard_state.guards.trigger[g] = values[g], here.zero.get(e.name, 0.0)
 
 
 # Switches whose guards are beyond zero at the end of a step though no crossing was detected.
@@ -442,7 +438,8 @@ class EventDrivenMotion:
         self.engine.stop()
         self.loop = self._loop()
         if isinstance(before, GuardedLoop) and isinstance(self.loop, GuardedLoop):
-            self.loop.guard_state.side[:], self.loop.guard_state.g[:] = before.guard_state.side, before.guard_state.g
+            now, old = self.loop.guard_state, before.guard_state
+            now.side[:], now.guards[:] = old.side, old.guards
         clock.count.started, clock.count.status = 0, ex.RUNNING
         if to not in IMPLICIT_METHODS and not clock.real.step:
             clock.real.h = 0.0  # chosen as at the start
