@@ -167,9 +167,9 @@ def test_the_engine_of_edited_sources_is_not_in_the_cache(runs):
     ask = "from flyball.compiler.object_files import is_stored\nfrom flyball.engine.entry_point import engine\n"
     ask += "print(json.dumps({'cold': not is_stored(engine)}))\n"
     assert not copy.run(ask)["cold"]
-    copy.edit("engine/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
+    copy.edit("engine/loads.py", "sub(gravity, a)", "sub(neg(gravity), a)")
     assert copy.run(ask)["cold"]
-    copy.edit("engine/loads.py", "sub(neg(gravity), load3", "sub(gravity, load3")
+    copy.edit("engine/loads.py", "sub(neg(gravity), a)", "sub(gravity, a)")
     assert not copy.run(ask)["cold"]
 
 
