@@ -90,7 +90,7 @@ class Record(np.ndarray):
     ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
     annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
     each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``; further dimensions, such as time, may
-    follow. With ``vectors=True`` each entry is a row of the array, of any length: annotated as `Column` it is read
+    follow, and one row, ``x[k].mass``, has the names too. With ``vectors=True`` each entry is a row of the array, of any length: annotated as `Column` it is read
     number by number, as `Float1` it is an array. There may be further rows. ``Annotated[np.ndarray, "mass"]`` is
     another name of ``mass``.
     """
@@ -120,13 +120,15 @@ class Record(np.ndarray):
 
 def _entry_property(first: int, count: int, rows: bool, vectors: bool) -> property:
     where = first if count == 1 else slice(first, first + count)
-    place = (slice(None), where) if rows else where
 
     def get(self: Record) -> Any:
-        return self.view(np.ndarray)[place] if count > 1 or rows or vectors else self[first]
+        if count == 1 and not rows and not vectors:
+            return self[first]
+        numbers = self.view(np.ndarray)
+        return numbers[:, where] if rows and self.ndim > 1 else numbers[where]
 
     def put(self: Record, value: Any) -> None:
-        self[place] = value
+        self[(slice(None), where) if rows and self.ndim > 1 else where] = value
 
     return property(get, put)
 
