@@ -90,9 +90,9 @@ class Record(np.ndarray):
     ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field. An entry
     annotated as `Vector3` is an array of three numbers. With ``rows=True`` the array has a row of these entries for
     each element, in one place of memory: ``x.mass[k]``, ``x.velocity[k, i]``; further dimensions, such as time, may
-    follow, and one row, ``x[k].mass``, has the names too. With ``vectors=True`` each entry is a row of the array, of any length: annotated as `Column` it is read
-    number by number, as `Float1` it is an array. There may be further rows. ``Annotated[np.ndarray, "mass"]`` is
-    another name of ``mass``.
+    follow, and one row, ``x[k].mass``, has the names too. With ``vectors=True`` each entry is a row of the array, of
+    any length: annotated as `Column` it is read number by number, as `Float1` it is an array. There may be further
+    rows. ``Annotated[np.ndarray, "mass"]`` is another name of ``mass``.
     """
 
     layout: ClassVar[RecordForm]
