@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from subprocess import PIPE
 from threading import Lock
+from typing import TextIO
 
 from .announcements import COSTS, DEFAULT_COST
 from .formulas import KERNELS, PACKAGE, compiled_files
@@ -99,9 +101,14 @@ class _SharedWork:
 
     def serve(self) -> None:
         """Run one process that compiles kernels until none is left or one fails."""
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:  # a full pipe would stop the process
+            self._share_with(errors)
+
+    def _share_with(self, errors: TextIO) -> None:
+        """Give kernels to a process that writes its errors to a file."""
         code = _WORKER.format(path=sys.path)
         process = subprocess.Popen(
-            [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1
+            [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=errors, text=True, bufsize=1
         )
         give, answers = process.stdin, process.stdout
         assert give is not None
@@ -114,7 +121,9 @@ class _SharedWork:
                 break
             give.write(f"{name}\n")
             if answers.readline().strip() != name:
-                self.failures.append(f"{name} cannot be compiled: {process.communicate()[1][-1000:]}")
+                process.communicate()
+                errors.seek(0)
+                self.failures.append(f"{name} cannot be compiled: {errors.read()[-1000:]}")
                 return
             with self.lock:
                 self.ready += 1

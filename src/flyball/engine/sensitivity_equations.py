@@ -316,7 +316,7 @@ def augmented_derivative(t, y, dy, A, P):
     status = call_engine(A, MOTION)
     if status == 0:
         copy_motion_part(own.K[0], dy, P, True)
-        set_reference_state(A, P, t, A[W_].y[0])
+        set_reference_state(A, P, t, A[W_].trial.state)
         change_rates(y, dy, A, P)
     return status
 
