@@ -49,6 +49,8 @@ ASKED = {
     "root_locus": lambda m: m.root_locus("k", (1.0, 2.0)),
     "sensitivity": lambda m: m.sensitivity(("B.angle",), ("k",)),
     "optimize": lambda m: m.optimize(("B.angle",), ("k",), target=0.0),
+    "fit": lambda m: m.fit({"t": (0.01, 0.02, 0.03), "B.angle": (0.0, 0.01, 0.03)}, ("k",)),
+    "stepper": lambda m: m.stepper(0.01).step,
     "prepare": lambda m: m.prepare(),
     "compare": lambda m: m.compare(0.01, repeats=0),
     "symbolic": lambda m: m.symbolic(),
@@ -59,14 +61,16 @@ POSITIONS = {"assemble", "check", "mobility", "mass_properties"}
 HOLDS = {"equilibrium", "linearize", "modes"}
 DRIVEN = {"kinematics", "inverse_dynamics"}
 SLIDES = {"prepare", "symbolic", "export"}
+STEPS = {"stepper"}
 KNOWN = {
-    **dict.fromkeys(("JointFriction", "Brake", "Clutch"), POSITIONS | HOLDS | DRIVEN | SLIDES),
-    "Limit": POSITIONS | HOLDS | DRIVEN | {"prepare"},
-    **dict.fromkeys(("Backlash", "OneWay", "Rope"), POSITIONS | HOLDS | DRIVEN),
+    **dict.fromkeys(("JointFriction", "Brake", "Clutch"), POSITIONS | HOLDS | DRIVEN | SLIDES | STEPS),
+    "Limit": POSITIONS | HOLDS | DRIVEN | STEPS | {"prepare"},
+    "Rope": POSITIONS | HOLDS | DRIVEN | STEPS,
+    **dict.fromkeys(("Backlash", "OneWay"), POSITIONS | HOLDS | DRIVEN),
     "Ratchet": POSITIONS | HOLDS,
     "ShearPin": POSITIONS | HOLDS,
-    "Contact": POSITIONS | HOLDS,
-    "Bodies": POSITIONS,
+    "Contact": POSITIONS | HOLDS | STEPS,
+    "Bodies": POSITIONS | STEPS,
     "Event": POSITIONS,
 }
 """Which analyses answer; all others refuse."""

@@ -344,6 +344,7 @@ def test_functions_of_expressions(name):
         "max": ", 0.9, 0.2",
         "step": ", 0.1, 1, 0.8, 3",
         "step5": ", 0, 1, 1, 3",
+        "trapezoid": ", 0.1, 1, 0.8, 3, 0.3",
     }
     text = "where(x < 0.5, x**2, x**3)" if name == "where" else f"{name}(2*x{rest.get(name, '')})/3 - x**1.5"
     x = 0.31

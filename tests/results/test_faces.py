@@ -43,6 +43,7 @@ MADE = {
     "Comparison": lambda: rig().compare(0.02, formulations=["projection", "baumgarte"]),
     "Sensitivity": lambda: rig().sensitivity(["bob.x"], ["length"], t=0),
     "Study": lambda: rig().study({"length": [1.0, 1.1]}, ["end(bob.x)", "bob.y"], t_end=0.01, outputs=3),
+    "Fit": lambda: rig().fit({"t": [0.01, 0.02, 0.03], "bob.x": [1.1, 1.1, 1.09]}, ["length"]),
     "Optimum": lambda: rig().optimize(["bob.x"], ["length"], target=[2.0]),
     "Equilibrium": lambda: rig().equilibrium(),
     "EquilibriumSeries": lambda: rig().equilibria("length", [1, 1.1]),
@@ -64,7 +65,12 @@ def returned() -> set[str]:
     out = set()
     for name, f in inspect.getmembers(fb.Mechanism, inspect.isfunction):
         if f.__module__.startswith("flyball.mechanism_methods") and not name.startswith("_"):
-            out |= set(re.findall(r"\w+", str(f.__annotations__.get("return", "")))) - {"None", "str", "Any"}
+            out |= set(re.findall(r"\w+", str(f.__annotations__.get("return", "")))) - {
+                "None",
+                "str",
+                "Any",
+                "Stepper",
+            }  # which is no result
     return out
 
 

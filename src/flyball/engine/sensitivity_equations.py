@@ -130,8 +130,8 @@ def project_change(A, P, k, dq, dv):
         complex_step_residual(A, dq, dv, P.still, CONSTRAINT_GAPS)
         for b in range(S.tree.parent.shape[0]):
             if S.tree.law[b] >= 0:
-                dq[S.tree.v[b]] = WC.y[0, S.tree.q[b]].imag / COMPLEX_STEP
-                dv[S.tree.v[b]] = WC.y[0, nq + S.tree.v[b]].imag / COMPLEX_STEP
+                dq[S.tree.v[b]] = WC.trial.state[S.tree.q[b]].imag / COMPLEX_STEP
+                dv[S.tree.v[b]] = WC.trial.state[nq + S.tree.v[b]].imag / COMPLEX_STEP
         if nr > 0:
             for d in range(nv):
                 rows[0, d] = 0.0
@@ -161,10 +161,10 @@ def state_change(A, P, k, dq, dv, dc, rate, powers):
     set_parameter_step(P, k, False)
     solve_change(A, P, found, 1.0)
     for i in range(powers.shape[0]):
-        powers[i] = WC.y[1, i].imag / COMPLEX_STEP if i < dc.shape[0] else 0.0
+        powers[i] = WC.trial.rate[i].imag / COMPLEX_STEP if i < dc.shape[0] else 0.0
     for f in range(S.forces.F.shape[0]):
         if S.forces.work[f] >= 0:
-            powers[S.forces.work[f]] = WC.y[1, S.forces.work[f]].imag / COMPLEX_STEP
+            powers[S.forces.work[f]] = WC.trial.rate[S.forces.work[f]].imag / COMPLEX_STEP
     if P.pressing.shape[0] > 0:
         add_friction_feedback(P, found, powers, nv)
     for r in range(nr):
@@ -228,7 +228,7 @@ def friction_responses(A, P):
         for f in range(S.forces.F.shape[0]):
             i = S.forces.work[f]
             if i >= 0:
-                P.friction_power[j, i] = WC.y[1, i].imag / COMPLEX_STEP
+                P.friction_power[j, i] = WC.trial.rate[i].imag / COMPLEX_STEP
 
 
 @formula
