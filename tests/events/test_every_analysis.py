@@ -65,8 +65,7 @@ STEPS = {"stepper"}
 KNOWN = {
     **dict.fromkeys(("JointFriction", "Brake", "Clutch"), POSITIONS | HOLDS | DRIVEN | SLIDES | STEPS),
     "Limit": POSITIONS | HOLDS | DRIVEN | STEPS | {"prepare"},
-    "Rope": POSITIONS | HOLDS | DRIVEN | STEPS,
-    **dict.fromkeys(("Backlash", "OneWay"), POSITIONS | HOLDS | DRIVEN),
+    **dict.fromkeys(("Backlash", "OneWay", "Rope"), POSITIONS | HOLDS | DRIVEN),
     "Ratchet": POSITIONS | HOLDS,
     "ShearPin": POSITIONS | HOLDS,
     "Contact": POSITIONS | HOLDS | STEPS,

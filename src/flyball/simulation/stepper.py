@@ -399,9 +399,10 @@ def _way_of_motion(model: Model, o: StepperOptions) -> str:
     if unknown:
         other = next((x for x in switching if x not in unknown), "")
         why = f" together with {other}" if other else ""
+        names = ", ".join(f"{e.name!r}: None" for e in model.elements() if e.title in unknown)
         raise ModelError(
-            f"a stepper of {name!r} does not support {unknown[0]}{why}; compute what it does between the steps, or "
-            "leave it out"
+            f"a stepper of {name!r} does not support {unknown[0]}{why}; compute what it does between the steps. "
+            f"Without it: m.changed({{{names}}}).stepper(...)"
         )
     if o.step is not None:
         raise ModelError(f"{IMPULSE_STEPPING} takes its step as method=fb.Stepping(step=...); leave step= out")
