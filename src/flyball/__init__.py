@@ -39,6 +39,7 @@ Ask how it moves
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
     m.compare(t_end)              -> Comparison of formulations of the equations of motion
+    m.stepper(dt, inputs=...)     -> Stepper: advanced by a program outside, for control loops and learning
     m.prepare()                   -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
 
 Ask where it rests, and what small motions do
@@ -61,6 +62,7 @@ Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
     m.sensitivity(of, to)         -> Sensitivity: exact derivatives
     m.optimize(of, to)            -> Optimum: the values that fit best
+    m.fit(data, to)               -> Fit: values from measurements, with confidence intervals
     m.study(vary, of, t_end=...)  -> Study: many runs on all cores, grids and samples; study.indices() -> Indices
 
 Read a result
@@ -153,6 +155,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.modes import Modes as Modes
     from .results.modes import RootLocus as RootLocus
     from .results.result import Result as Result
+    from .results.sensitivity_and_optimum import Fit as Fit
     from .results.sensitivity_and_optimum import Optimum as Optimum
     from .results.sensitivity_and_optimum import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -80,6 +81,11 @@ CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 def test_pages_and_search_work_from_a_file(site):
     """Opened as a file: nothing else is asked for, the search finds, no page is wider than a phone."""
+    with ThreadPoolExecutor(1) as apart:  # another test of the same process may have a browser open
+        apart.submit(look_at_pages, site).result()
+
+
+def look_at_pages(site):
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as p:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
