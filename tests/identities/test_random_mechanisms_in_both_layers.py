@@ -62,6 +62,8 @@ def exact(a):
     if len(G):
         B = G @ R
         size = np.linalg.norm(B, axis=1)
+        if not size.all():  # a driven deflection of 0: the solvers refuse it
+            return None
         U, d, V = np.linalg.svd(B / size[:, None], full_matrices=False)
         kept = d > CERTAIN * d[0]
         wanted = (gamma - G @ x) / size
@@ -87,7 +89,7 @@ def absolute(r, structure):
 # those have digits of their own; an ideal rope has no tension without a motion
 @pytest.mark.parametrize(
     "family",
-    [f for f in FAMILIES if f not in ("extremes", "stiff", "ropes", "happenings", "shaken", "orientations")],
+    [f for f in FAMILIES if f not in ("extremes", "stiff", "ropes", "happenings", "shaken")],
 )
 def test_the_same_at_the_same_state(family):
     compared = 0

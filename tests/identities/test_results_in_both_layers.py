@@ -48,9 +48,7 @@ def motions(r):
             yield f"{e.name}.angular acceleration", 2, view.angular_acceleration
     for joint in r.model.joints:
         for what in joint.measured(r.planar):
-            # the rate of a deflection of 0 has no direction
-            still = what == "deflection" and np.min(getattr(r[joint.name], what)) < 1e-6
-            for order, ending in enumerate(("",) if still else ("", "_rate", "_acceleration")):
+            for order, ending in enumerate(("", "_rate", "_acceleration")):
                 yield f"{joint.name}.{what}{ending}", order, getattr(r[joint.name], what + ending)
 
 

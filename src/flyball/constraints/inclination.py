@@ -1,21 +1,23 @@
 """The angle between a direction f fixed in F and a direction m fixed in M, and the pitch of m against a plane of F.
 
 ``angle_row``: theta = atan2(|m x f|, m.f), from 0 to pi: the deflection of an axis. ``pitch_row``: the angle of m
-below the plane square to f, theta - pi/2, from -pi/2 to pi/2; for the coordinate of that name m is x of M and f is z of
-F. Both have the rate n.(w_M - w_F) with the unit vector n = f x m / |f x m|.
+below the plane perpendicular to f, theta - pi/2, from -pi/2 to pi/2. For the coordinate of that name m is x of M and
+f is z of F. Both have the rate n.(w_M - w_F) with the unit vector n = f x m / |f x m|.
 
-Where m and f are parallel n has no direction. There a deflection is at its least or greatest value: n is zero. A
-pitch is the second of three angles of rotation, of which the other two are undefined there: n is no number.
+Where m and f are parallel but for rounding, n has no direction. There a deflection is at its least or greatest value:
+n is zero. A pitch is the second of three angles of rotation, of which the other two are undefined there: its row is
+nan.
 """
 
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from ..math.scalar import atan2, divide, sqrt, unless_zero
+from ..math.scalar import atan2, choose, divide, sqrt
 from ..math.vec import add, cross, dot, mv, neg, scale, sub
 
 KIND_ANGLE = 18
 KIND_PITCH = 19
+PARALLEL = 1e-13  # sine of the angle of two directions that rounding of rotations can cause
 
 
 @formula
@@ -49,7 +51,7 @@ def product_rate(F, M, f, m):
 def angle_row(par, F, M, hint, data):
     """Value, force on M, torques on M and F, acceleration bias."""
     f, m, e, s, c = directions(par, F, M)
-    r = unless_zero(s, divide(1.0, s), 0.0 * s)
+    r = choose(s - PARALLEL, divide(1.0, s), 0.0 * s)
     return turning_row(atan2(s, c) - par[6], scale(r, e), r, F, M, product_rate(F, M, f, m))
 
 
