@@ -72,6 +72,7 @@ def test_malformed_toml_is_shown_with_its_line() -> None:
                 "m.toml: [[joints]] 1 'A' (line 5): unknown type 'Revolut' (did you mean 'Revolute'?); joints are Cam, Cyl"
             ],
         ),
+        (BODY + "[[joints]]\nname = 'A'\ntype = 'Hinge'", ["unknown type 'Hinge' (did you mean 'Revolute'?); joints"]),
         (BODY + "[[forces]]\nname = 'f'", ["[[forces]] 1 'f' (line 5): it has no type; forces are Actuator, Brake"]),
         (
             BODY + "[[joints]]\ntype = 'Spherical'\nname = 'S'\nbody_i = 'ground'\nbody_j = 'crnk'\nat = [0, 0, 0]",

@@ -52,8 +52,8 @@ FIELDS_ELSEWHERE = {
 
 def suggest_part(name: str, known: Iterable[str]) -> str:
     """Return ' (did you mean ...?)' for the name of a class: as other programs call it, or a similar name."""
-    here = NAMES_ELSEWHERE.get(name.lower())
-    return f" (did you mean {here!r}?)" if here else suggest(name, known)
+    here, known = NAMES_ELSEWHERE.get(name.lower()), list(known)
+    return f" (did you mean {here!r}?)" if here in known else suggest(name, known)
 
 
 def listing(names: list[str]) -> str:

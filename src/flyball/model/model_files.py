@@ -26,6 +26,7 @@ from .event import Event
 from .expression_parser import function_name
 from .force import Force, Unilateral
 from .joint import Coupling, Joint
+from .messages import suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
 from .shapes.mesh import Mesh, paths_from
@@ -339,7 +340,7 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
     if category == "forces" and name == Touch.__name__:  # contact points of a motion, in its result file
         return Touch
     if name not in known:
-        problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
+        problem = "it has no type" if name is None else f"unknown type {name!r}{suggest_part(str(name), known)}"
         hint = "" if name is None else ". A type of your own is known once the Python file that defines it is imported"
         raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}{hint}")
     return Element.of_type(name, f"{where}: ")
