@@ -45,6 +45,7 @@ USES = {
     "Bushing": 'fb.Bushing("mount", "ground", "arm", at=(0, 0, 0), stiffness=(1e6, 1e6, 1e5), damping=(1e3, 1e3, 1e2))',
     "Clutch": 'fb.Clutch("clutch", "A.angle", "B.angle", capacity="20 N*m")',
     "CoordinateSpring": 'fb.CoordinateSpring("spring", "A.angle", stiffness=50, damping=0.4, rest="10 deg")',
+    "RotorInertia": 'fb.RotorInertia("rotor", "A.angle", inertia="40 g*cm^2", ratio=100)',
     "Detent": 'fb.Detent("notches", "A.angle", pitch="30 deg", holding="2 N*m")',
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',

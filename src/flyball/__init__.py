@@ -19,7 +19,7 @@ Describe a mechanism
                   RollingDisk, RollingBall, KnifeEdge
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
-                  JointFriction, Clutch, Brake, PointForce, PointTorque
+                  RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws

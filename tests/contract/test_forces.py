@@ -37,6 +37,7 @@ PARAMETERS = {
     "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0, 1.0, 1.0),
     "Motor": (),
     "Rope": (30.0, 2.0, 0.4),
+    "RotorInertia": (),
     "TorsionalSpringDamper": (30.0, 2.0, 0.4),
 }
 UNDAMPED = {  # of those that store energy and damp as well

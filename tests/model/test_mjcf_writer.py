@@ -32,6 +32,8 @@ def forest() -> fb.Mechanism:
     m.add(fb.Frame("tool", "b3", position=(0.1, 0.2, 0.3), orientation=(0.1, 0.2, 0.3)))
     m.add(fb.CoordinateSpring("spring", "arm.angle", stiffness=3, damping=0.2, rest=0.1))
     m.add(fb.CoordinateSpring("damping", "r.angle", damping=0.3), fb.Actuator("motor", "p.displacement", force="3*u"))
+    m.add(fb.RotorInertia("rotor", "arm.angle", inertia=0.02, ratio=3))
+    m.add(fb.RotorInertia("spindle", "p.displacement", inertia=1e-3, ratio=40))
     m.add(fb.Limit("stop", "r.angle", lower=-1.5), fb.Brake("rub", "c.angle", capacity=0.0))
     return m
 

@@ -23,6 +23,7 @@ from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
 from ..laws.bytecode import BY_TIME, evaluate_jet
 from ..numerics.rank import fundamental_subspaces
+from ..tables.coordinate_choice import require_rotor_coordinates
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import ALONG, SLIDING, System, Work, with_numbers
 from ..tables.values import Values, values
@@ -157,14 +158,22 @@ class MechanismState:
     effort: np.ndarray  # efforts of prescribed coordinates, (nv,), zero elsewhere
 
     @classmethod
-    def moving(cls, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> MechanismState:
+    def moving(
+        cls, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray, *, rotors: bool = True
+    ) -> MechanismState:
         """State with the accelerations and multipliers that solve the equations of motion.
+
+        Without ``rotors`` the inertia of rotors that is not along a velocity is neglected: for magnitudes only.
 
         Raises
         ------
         AnalysisError
             If the equations have no solution.
+        ModelError
+            If the inertia of a rotor is not along a velocity.
         """
+        if rotors:
+            require_rotor_coordinates(c.structure)
         if c.at(t, q, v, MOTION)[0] != 0:
             from ..simulation.diagnosis import reason_without_solution  # simulation imports derivatives
 

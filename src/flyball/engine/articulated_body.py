@@ -11,9 +11,10 @@ twist column X is eliminated at a time. Let
 
     I = [J H; H^T K]: (angular velocity, velocity of the point) -> (moment, force)
 
-be the articulated inertia of everything beyond the joint. With U = I X and D = X . U, the parent sees I - U U^T / D. M
-itself is not formed. Gravity, gyroscopic terms and bias accelerations are contained in f, so no velocity occurs here. A
-velocity that a driver prescribes is not eliminated: its acceleration is given, and the driver's effort is computed.
+be the articulated inertia of everything beyond the joint. With U = I X and D = X . U + J, where J is the inertia of
+rotors that turn with the velocity, the parent sees I - U U^T / D. M itself is not formed. Gravity, gyroscopic terms
+and bias accelerations are contained in f, so no velocity occurs here. A velocity that a driver prescribes is not
+eliminated: its acceleration is given, and the driver's effort is computed.
 
 Parents precede their children in the body table. Where a body directly follows its parent, as in a chain, the
 quantities passed between the two stay in registers; all others are stored in row b of
@@ -170,10 +171,14 @@ def mass_entries(S, W):
                 a0 = S.tree.v[a]
                 if S.tree.joint[a] == REVOLUTE:
                     W.M[e] = dot(load3(W.twists.angular, a0, 0), moment)
+                    if a0 == d:
+                        W.M[e] += S.rotor_inertia[d]
                     e += 1
                 else:
                     for i in range(a0, min(a0 + S.tree.nv[a], d + 1)):
                         W.M[e] = dot(load3(W.twists.angular, i, 0), moment) + dot(load3(W.twists.linear, i, 0), force)
+                        if i == d:
+                            W.M[e] += S.rotor_inertia[d]
                         e += 1
                 moment = add(moment, cross(load3(C.offset, a, 0), force))
                 a = S.tree.parent[a]
@@ -286,6 +291,7 @@ def eliminate_velocities(S, W, b, I):
             least = dot(w, w) * size + dot(v, v) * mass
         store3(W.pivots.torque, d, 0, t)
         store3(W.pivots.force, d, 0, f)
+        D = D + S.rotor_inertia[d]
         W.pivots.inertia[d] = D
         if S.tree.law[b] < 0:
             if not positive(D - PIVOT_ROUNDING * least):

@@ -91,7 +91,7 @@ def perform_at_state(S, W, V, D, batch, i, task):
         if task == CENTROIDAL_MATRIX:
             centroidal_momentum_matrix(S, V, D, batch.first[i])
             return 0
-        mass_matrix(V, D, batch.first[i])
+        mass_matrix(S, V, D, batch.first[i])
         return 0
     v = batch.v[i]
     if task == FORWARD_DYNAMICS or task == FORWARD_DERIVATIVES:
@@ -110,7 +110,7 @@ def perform_at_state(S, W, V, D, batch, i, task):
         return 0
     move_bodies(S, V, D, v)
     if task == MOMENTUM:
-        total_momentum(S, W, D, batch.first[i])
+        total_momentum(S, W, D, v, batch.first[i])
     else:
         frame_jacobian_rate(S, W, V, D, frame.body[0], position(frame), batch.first[i])
     return 0

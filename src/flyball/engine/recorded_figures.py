@@ -51,15 +51,17 @@ class RecordedFigures(NamedTuple):
 
 
 @formula
-def record_energies(S, W, out, n):
-    """Record the energies of all bodies and forces at the state in W."""
+def record_energies(S, W, v, out, n):
+    """Record the energies of all bodies and forces at the state in W, whose velocities are v."""
     gravity = (S.gravity[0], S.gravity[1], S.gravity[2])
     for b in range(S.tree.parent.shape[0]):
-        p, v, m = load3(W.bodies.position, b, 0), load3(W.bodies.velocity, b, 0), S.bodies.mass[b]
+        p, u, m = load3(W.bodies.position, b, 0), load3(W.bodies.velocity, b, 0), S.bodies.mass[b]
         w = mtv(load9(W.bodies.rotation, b, 0), load3(W.bodies.angular_velocity, b, 0))
-        out.kinetic[n, b] = 0.5 * (m * dot(v, v) + dot(w, mv(load9(S.bodies.inertia, b, 0), w)))
+        out.kinetic[n, b] = 0.5 * (m * dot(u, u) + dot(w, mv(load9(S.bodies.inertia, b, 0), w)))
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
+            out.kinetic[n, b] += 0.5 * S.rotor_inertia[d] * v[d] * v[d]
         out.gravity[n, b] = -m * dot(gravity, p)
-        out.speed[n, b] = norm(v)
+        out.speed[n, b] = norm(u)
         for i in range(3):
             out.position[n, b, i] = p[i]
     for k in range(S.forces.F.shape[0]):
@@ -100,6 +102,8 @@ def record_gain(S, W, x, out, n):
         a = add(a, load3(W.bodies.bias_acceleration, b, 0))
         alpha = mtv(load9(W.bodies.rotation, b, 0), add(alpha, load3(W.bodies.bias_angular_acceleration, b, 0)))
         out.gain[n, b] = 0.5 * (S.bodies.mass[b] * dot(a, a) + dot(alpha, mv(load9(S.bodies.inertia, b, 0), alpha)))
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
+            out.gain[n, b] += 0.5 * S.rotor_inertia[d] * x[d] * x[d]
         largest = max(largest, norm(a) / S.scales.length, norm(alpha))
     return largest
 
@@ -183,7 +187,8 @@ def record_motion_kernel(
             W.sensed.value[direction_column(S, W, s)] = out.modes[n, 2 * nw + s]
         evaluated = stride > 0 and n % stride == 0
         status = call(address, S, W, R, clock, output, MOTION if evaluated else POSITION)
-        record_energies(S, W, out, n)
+        nq = S.sizes.coordinates
+        record_energies(S, W, out.states[n, 1 + nq : 1 + nq + nv], out, n)
         x = W.velocities.solved if deferred else out.states[n, 1 + ny : 1 + ny + nv]
         if evaluated and status == 0:
             largest = record_gain(S, W, x, out, n)

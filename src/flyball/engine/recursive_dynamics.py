@@ -235,7 +235,7 @@ def newton_euler(S, W, V, D, v, vdot, tau):
     for b in range(n - 1, -1, -1):
         force = load6(D.force, b)
         for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
-            tau[d] = dot6(load6(D.column, d), force)
+            tau[d] = dot6(load6(D.column, d), force) + S.rotor_inertia[d] * vdot[d]
         a = S.tree.parent[b]
         if a >= 0:
             store6(D.force, a, add6(load6(D.force, a), force))
@@ -278,7 +278,7 @@ def composite_inertias(S, W, D):
 
 
 @formula
-def mass_matrix(V, D, M):
+def mass_matrix(S, V, D, M):
     """The whole mass matrix, symmetric, from the composite inertias; zero for velocities of different branches."""
     for d in range(V.body.shape[0]):
         momentum = inertia_times(load_inertia(D, V.body[d]), load6(D.column, d))
@@ -291,6 +291,7 @@ def mass_matrix(V, D, M):
                 M[d, k] = 0.0
                 M[k, d] = 0.0
             e = beyond
+        M[d, d] = M[d, d] + S.rotor_inertia[d]
 
 
 @formula
@@ -408,7 +409,7 @@ def newton_euler_derivatives(S, W, V, D, v, vdot, by_position, by_velocity, by_a
     composite_inertias(S, W, D)
     composite_coriolis(S, W, D)
     displacement_terms(S, V, D, v, vdot)
-    mass_matrix(V, D, by_acceleration)
+    mass_matrix(S, V, D, by_acceleration)
     clear(by_position, V.body.shape[0], V.body.shape[0])
     clear(by_velocity, V.body.shape[0], V.body.shape[0])
     for d in range(V.body.shape[0]):
@@ -454,10 +455,11 @@ def forward_dynamics_derivatives(V, D, by_position, by_velocity, inverse):
 
 
 @formula
-def total_momentum(S, W, D, out):
+def total_momentum(S, W, D, v, out):
     """Centre of mass, momentum, angular momentum about it, kinetic and potential energy of all bodies, into ``out``.
 
-    The potential of gravity is zero at the world's origin. `newton_euler` has computed the velocities.
+    The potential of gravity is zero at the world's origin. `newton_euler` has computed the velocities. Rotors have
+    kinetic energy at the generalised velocities v, and no momentum.
     """
     o = 0.0 * D.point[0, 0]
     zero = (o, o, o)
@@ -471,6 +473,8 @@ def total_momentum(S, W, D, out):
         momentum = add(momentum, p[1])
         angular = add(angular, add(p[0], cross(P, p[1])))
         kinetic += 0.5 * dot6(velocity, p)
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
+            kinetic += 0.5 * S.rotor_inertia[d] * v[d] * v[d]
     centre = scale(1.0 / mass, moment)
     store3(out, 0, 0, centre)
     store3(out, 0, 3, momentum)

@@ -65,8 +65,10 @@ from .stabilization import set_prescribed
 
 
 @formula
-def inertial_terms(S, W, out):
+def inertial_terms(S, W, vdot, out):
     """Write inertial wrench and weight of every body, projected on its own and its ancestors' velocities.
+
+    Inertias of rotors join the term of the velocity with which they turn.
 
     Returns the number of terms.
     """
@@ -76,18 +78,21 @@ def inertial_terms(S, W, out):
     at = 0
     for b in range(S.tree.parent.shape[0]):
         force, torque = load3(W.body_wrenches.force, b, 0), load3(W.body_wrenches.torque, b, 0)
+        v0 = S.tree.v[b]
+        for k in range(S.tree.nv[b]):
+            out[at + k] += S.rotor_inertia[v0 + k] * vdot[v0 + k]
         at = wrench_terms(S, W, b, out, at, -1.0, force, torque, load3(W.bodies.position, b, 0))
     return at
 
 
 @formula
-def residual_terms(S, W, t, lam, out):
+def residual_terms(S, W, t, vdot, lam, out):
     """Write the terms of r; kinematics, rows and loads are known. Returns their number.
 
     The order is that of `simulation/implicit/jacobian_pattern.py`: bodies; of each force between frames the side of M,
     then that of F; rows; forces along measured quantities.
     """
-    at = inertial_terms(S, W, out)
+    at = inertial_terms(S, W, vdot, out)
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] == BETWEEN:
             _, M, force, torque = wrench_between_frames(S, W, t, k)
@@ -255,13 +260,13 @@ def residuals(S, W, bench, task):
             for b in range(S.tree.parent.shape[0]):
                 body_pose(S, W, b, p[:nq])
                 accelerated_motion(S, W, b, p[nq : nq + nv], a)
-            inertial_terms(S, W, bench.out[n, behind:])
+            inertial_terms(S, W, a, bench.out[n, behind:])
         else:
             update_accelerated_kinematics(S, W, t, p, a, task == RESIDUAL_STEPS or S.sensor_drivers.row.shape[0] > 0)
             if task == RESIDUAL_TERMS:
-                store_residual_terms(S, W, t, p, bench.lam, bench.out[n], behind)
+                store_residual_terms(S, W, t, p, a, bench.lam, bench.out[n], behind)
             else:
-                store_residual(S, W, t, p, bench.lam, bench.out[n])
+                store_residual(S, W, t, p, a, bench.lam, bench.out[n])
             for c in range(known, behind):
                 bench.out[n, c] = -W.trial.rate[c - known]
     return 0
@@ -279,7 +284,7 @@ def residual(S, W, t, p, vdot, lam, out):
         accelerated_motion(S, W, b, v, vdot)
     update_frame_motions(S, W)
     row_biases(S, W, t, v, z)  # the bias at the true accelerations is the acceleration itself
-    store_residual(S, W, t, p, lam, out)
+    store_residual(S, W, t, p, vdot, lam, out)
 
 
 @formula
@@ -295,8 +300,8 @@ def update_accelerated_kinematics(S, W, t, p, vdot, whole):
 
 
 @formula
-def store_residual(S, W, t, p, lam, out):
-    """Store the residual of the equations with these multipliers; kinematics and rows are known."""
+def store_residual(S, W, t, p, vdot, lam, out):
+    """Store the residual of the equations with these accelerations and multipliers; kinematics and rows are known."""
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
@@ -317,21 +322,21 @@ def store_residual(S, W, t, p, lam, out):
     gather_forces(S, W, f)
     apply_efforts(S, W, t, W.trial.rate, f)
     for d in range(nv):
-        out[d] = -f[d]
+        out[d] = S.rotor_inertia[d] * vdot[d] - f[d]
     for k in range(nr):
         for e in range(S.row_start[k], S.row_start[k + 1]):
             out[S.column[e]] -= W.G[e] * lam[k]
 
 
 @formula
-def store_residual_terms(S, W, t, p, lam, out, first):
+def store_residual_terms(S, W, t, p, vdot, lam, out, first):
     """Store G v - nu, and from ``first`` on the terms of r."""
     nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
     v = p[S.sizes.coordinates : S.sizes.coordinates + nv]
     for k in range(nr):
         out[nv + nr + k] = row_times(S, W, k, v) - W.rows.nu[k]
     apply_multipliers(S, W, t, p, lam)
-    residual_terms(S, W, t, lam, out[first:])
+    residual_terms(S, W, t, vdot, lam, out[first:])
 
 
 @formula

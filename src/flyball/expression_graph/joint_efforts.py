@@ -18,7 +18,7 @@ from ..model.body import GROUND
 from ..model.element import Element
 from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode, called_table
 from ..model.expressions import Expression, number
-from ..tables.coordinate_choice import spanning_joints
+from ..tables.coordinate_choice import rotors, spanning_joints
 from ..tables.forest import joint_bodies
 from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure, velocity_names
@@ -79,7 +79,7 @@ def joint_efforts(model: Model, e: JointController, moving: bool) -> list[Syntax
 
 
 def controlled_robot(model: Model, e: JointController) -> Model:
-    """Bodies and joints of the controller's model: those that joints connect with its base, which is held fixed."""
+    """Bodies, joints and rotors of the controller's model: what joints connect with its base, which is held fixed."""
     ignored = set(e.ignored)
     near: dict[str, list[tuple[str, str]]] = {name: [] for name in (GROUND, *(b.name for b in model.bodies))}
     for joint in model.joints:
@@ -98,7 +98,8 @@ def controlled_robot(model: Model, e: JointController) -> Model:
                 reached.add(other)
                 waiting.append(other)
     _refuse_unreached(model, e, joints, base)
-    kept = reached | joints | {f.name for f in model.frames if f.body in reached} | {x.name for x in model.materials}
+    kept = reached | joints | {f.name for f in rotors(model) if f.coordinate_text().partition(".")[0] in joints}
+    kept |= {f.name for f in model.frames if f.body in reached} | {x.name for x in model.materials}
     parts: dict[str, Any] = {name: None for name in model.by_name if name not in kept}
     robot = model.changed(parts)
     robot.initial = []

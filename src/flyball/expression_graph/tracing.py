@@ -24,6 +24,7 @@ from ..engine.rows import count_measured, update_controllers
 from ..laws.bytecode import BY_TIME, evaluate_jet
 from ..model.expressions import is_number_text
 from ..model.model import Model
+from ..tables.coordinate_choice import require_rotor_coordinates
 from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import NUMBERS, PLANAR, System, Work, named_arrays, with_numbers
@@ -102,7 +103,13 @@ def trace_equations(
         Names of the symbols.
     reference : sequence, optional
         Values of the coordinates where the engine's are zero, (nq,): the equations are then in these coordinates.
+
+    Raises
+    ------
+    ModelError
+        If the inertia of a rotor is not along a velocity.
     """
+    require_rotor_coordinates(s)
     graph = Graph() if graph is None else graph
     names = names or numbered_symbols(s, len(S.rows.law))
     graph.functions.names.update(tables_by_name(s, S))

@@ -87,6 +87,7 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .point_force import PointForce as PointForce
     from .point_torque import PointTorque as PointTorque
     from .rope import Rope as Rope
+    from .rotor_inertia import RotorInertia as RotorInertia
     from .shear_pin import ShearPin as ShearPin
     from .spring_damper import SpringDamper as SpringDamper
     from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper

@@ -90,7 +90,7 @@ def operating_state(
     else:
         raise ModelError(f"about must be a result or an equilibrium, got {type(about).__name__}")
     s = a.compiled.structure
-    if many is not None and many(s.nv, len(s.rows)):
+    if many is not None and many(s.nv, len(s.rows)) and not s.rotors:
         a, why = base, SPARSE_REASON
     return MechanismState.moving(a.compiled, a.t, a.q, a.v), why
 
@@ -103,7 +103,7 @@ def _in_requested_coordinates(
 ) -> tuple[Assembly, str]:
     """Convert an assembly to the requested coordinates; large mechanisms stay in absolute coordinates."""
     s = base.compiled.structure
-    if many is not None and coordinates == "auto" and many(s.nv - len(s.rows), 0):
+    if many is not None and not s.missed_rotors and coordinates == "auto" and many(s.nv - len(s.rows), 0):
         return base, SPARSE_REASON
     return choose_coordinates(base, coordinates, parameters)
 

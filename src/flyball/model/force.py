@@ -158,6 +158,7 @@ class CoordinateForce(Force):
     }
     not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be negative
     sign: ClassVar[float] = 1.0  # sign of the output after value and rate, relative to the effort
+    adds_inertia: ClassVar[bool] = False  # whether it adds inertia to the mass matrix along a joint's coordinate
 
     def ends(self) -> dict[str, str]:
         """No frames of its own."""
@@ -177,6 +178,10 @@ class CoordinateForce(Force):
 
     def examine(self, model: Model) -> None:
         """Refuse coordinates along which it cannot act."""
+
+    def added_inertia(self, n: SimpleNamespace) -> Any:
+        """Return the inertia that it adds to the mass matrix along its coordinate [kg] or [kg m^2]."""
+        return 0.0
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
         """Return the terms (role of F, role of M, formula) of the sum along which it acts, if it has no coordinates."""

@@ -38,11 +38,16 @@ CONTACT_ELASTIC = "contact_elastic"
 
 
 def kinetic_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
-    """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
+    """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table, and of rotors that turn with their joints [J]."""
     _, R, w, v, _, _ = result.motions.bodies(bodies)
     table = result.values.system.bodies
     w_B, inertia = mtv(R, w), tuple(table.inertia[bodies].T[..., None])
-    return (0.5 * table.mass[bodies, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
+    own = (0.5 * table.mass[bodies, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
+    s, S = result.values.structure, result.values.system
+    moved = np.isin(np.repeat(np.arange(len(S.tree.nv)), S.tree.nv), bodies)
+    for d in {d for _, d in s.rotors if moved[d]}:
+        own = own + 0.5 * S.rotor_inertia[d] * result.v[:, d] * result.v[:, d]
+    return own
 
 
 def gravity_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:

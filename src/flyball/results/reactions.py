@@ -455,8 +455,14 @@ class ImpulseReactions(JointReactions):
         return W
 
     def _acting(self) -> SimpleNamespace:
-        """Return the same with rows and applied impulses."""
+        """Return the same with rows, applied impulses, and the momentum that rotors lost."""
         W = self._inertial()
+        s, S = self._result.values.structure, self._result.values.system
+        for rotor, d in s.rotors:
+            lost = S.rotor_inertia[d] * (self._result.v[:, d] - self._after.v[:, d])
+            for k, t in enumerate(s.terms):
+                if t.measured and t.row - len(s.rows) == s.measured[rotor.coordinate]:
+                    self._term(W, k, term_coefficient(self._result, k) * lost)
         for wrenches in self._by_rows.values():
             W.body_wrenches += wrenches
         return W

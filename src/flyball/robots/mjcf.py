@@ -15,6 +15,7 @@ from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
+from ..forces.rotor_inertia import RotorInertia
 from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
 from ..joints.prismatic import Prismatic
@@ -168,9 +169,10 @@ class _Reader:
     def _losses(self, j: int) -> Iterator[Element]:
         """Stops, spring, damping and friction of a joint."""
         M, d = self.M, self.M.jnt_dofadr[j]
-        if M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]].any():
-            self.unused.append(f"armature of {self.joints.get(j, 'the free joint')}")
+        armature = M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]]
         if M.jnt_type[j] not in COORDINATES:
+            if armature.any():
+                self.unused.append(f"armature of {self.joints.get(j, 'the free joint')}, which has no axis")
             if M.jnt_limited[j] or M.jnt_stiffness[j] or M.dof_damping[d] or M.dof_frictionloss[d]:
                 self.unused.append(f"limit, stiffness, damping or friction of {self.joints.get(j, 'the free joint')}")
             return
@@ -186,6 +188,8 @@ class _Reader:
             yield CoordinateSpring(self.free_name(f"{name}_spring"), along, damping=damping, **given)
         if friction:
             yield Brake(self.free_name(f"{name}_friction"), along, capacity=friction)
+        if armature[0]:
+            yield RotorInertia(self.free_name(f"{name}_rotor"), along, inertia=float(armature[0]))
 
     def _equality(self, k: int) -> Iterator[Element]:
         """Equalities as hard joints: connect, weld, and linear relations of joints."""

@@ -19,6 +19,7 @@ from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
+from ..forces.rotor_inertia import RotorInertia
 from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
 from ..joints.revolute import Revolute
@@ -250,6 +251,8 @@ class _Writer:
             return spring | ({"damping": repr(float(n.damping))} if n.damping else {})
         if isinstance(e, Brake) and isinstance(n.capacity, int | float) and n.static == 1.0:
             return {"frictionloss": repr(float(n.capacity))}
+        if isinstance(e, RotorInertia):
+            return {"armature": repr(float(e.added_inertia(n)))}
         return {}
 
     def _equalities(self, tag: ET.Element) -> None:

@@ -20,6 +20,7 @@ from ..linear.operating_point import operating_state
 from ..results.linear_model import sort_branches
 from ..results.sensitivity_and_optimum import Sensitivity
 from ..statics.equilibrium import LINEARIZE_DEFAULTS, equilibrium, rest_options
+from ..tables.coordinate_choice import rotors
 from .parameter_derivatives import DerivativeRequest, ParameterFunction, difference_derivative, offset_sample
 
 
@@ -63,9 +64,10 @@ def _system_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
     if any(e.sampled for e in a.model.controllers):
         return _cycle_matrix(a), ""
     about = _equilibrium_by_parameters(a)
+    coordinates = "joint" if rotors(a.model) else "absolute"
 
     def state(parameters: Mapping[str, float]) -> MechanismState:
-        return operating_state(a.model, about(parameters), t=a.t, parameters=parameters, coordinates="absolute")[0]
+        return operating_state(a.model, about(parameters), t=a.t, parameters=parameters, coordinates=coordinates)[0]
 
     begin = state(a.parameters)
     f, _, _ = equations_without_inputs(begin)
@@ -76,10 +78,11 @@ def _system_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
 def _cycle_matrix(a: DerivativeRequest) -> ParameterFunction:
     """Function for the matrix over one cycle of sampled controllers."""
     about = _equilibrium_by_parameters(a)
+    coordinates = "joint" if rotors(a.model) else "absolute"
 
     def linear(parameters: Mapping[str, float]) -> Any:
         place = about(parameters)
-        given = {"about": place, "t": None if place else a.t, "parameters": parameters, "coordinates": "absolute"}
+        given = {"about": place, "t": None if place else a.t, "parameters": parameters, "coordinates": coordinates}
         return controlled_linear_model(a.model, LinearizeOptions(**(LINEARIZE_DEFAULTS | given)))[0]
 
     first = linear(a.parameters)

@@ -239,7 +239,8 @@ def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
     begun = find_initial_state(a.model, a.t, a.parameters, None, a.coordinates)
     base, layer = begun.base, begun.assembly.compiled
     refuse_out_of_table(base, float(a.times[-1]))
-    x = MechanismState.moving(base.compiled, base.t, base.q, base.v)
+    # Positions and velocities change as the constraints allow; the accelerations at the start do not matter.
+    x = MechanismState.moving(base.compiled, base.t, base.q, base.v, rotors=False)
     e = EquationDerivatives(x)
     directions = [ParameterDirection(e, name) for name in a.to]
     values = [d.values if layer is base.compiled else values_with_complex_step(layer, d.name) for d in directions]

@@ -31,7 +31,9 @@ from ..tables.structure_definition import Structure
 from ..tables.table_definitions import KinematicRecords, System, Work, named_arrays, with_numbers
 from ..tables.values import Values
 
-PARAMETER_TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "scales", "units")
+PARAMETER_TABLES = (
+    "bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "scales", "units", "rotor_inertia",
+)  # fmt: skip
 SOLVER_FIELDS = (
     "inverse_inertia", "excess_inertia", "inverse_mass", "inverse_reference_inertia", "excess_mass",
     "inverse_reference_mass",

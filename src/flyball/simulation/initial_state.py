@@ -27,7 +27,13 @@ from ..results.phases import MotionStart, energies_at_end
 from ..results.recorded_kinematics import extra_turns
 from ..results.result import Result
 from ..tables.constraint_rows import declared_switches
-from ..tables.coordinate_choice import least_cost, right_hand_side_cost, spanning_joints
+from ..tables.coordinate_choice import (
+    least_cost,
+    require_rotor_coordinates,
+    right_hand_side_cost,
+    rotors,
+    spanning_joints,
+)
 from ..tables.element_numbers import shape_files
 from ..tables.law_inputs import forces_in_events, nonsmooth_elements
 from ..tables.reference_configuration import BodyState
@@ -60,7 +66,7 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     Raises
     ------
     ModelError
-        For an unknown wish.
+        For an unknown wish, or if the inertia of a rotor is not along a velocity.
     AnalysisError
         If joint coordinates are requested but friction or an event depends on reactions that redundancy leaves
         undetermined. In joint coordinates the tree joint would carry everything; in absolute coordinates the load is
@@ -68,18 +74,24 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     """
     refuse_unknown_coordinates(wish)
     if wish == "absolute":
+        require_rotor_coordinates(a.compiled.structure)
         return a, "absolute: as requested"
+    needed = bool(rotors(a.compiled.structure.model))
     if why := _indeterminate_loads(a):
-        if wish == "joint":
+        if wish == "joint" or needed:
             raise AnalysisError(
                 f"{a.compiled.structure.model.name!r} has no motion of its own in joint coordinates: {why}"
             )
         return a, f"absolute: {why}"
     here = _evaluation_cost(a.compiled.structure)
-    c, why = _sound_forest(a, parameters, here if wish == "auto" else np.inf)
+    c, why = _sound_forest(a, parameters, here if wish == "auto" and not needed else np.inf)
     if c is None:
+        require_rotor_coordinates(a.compiled.structure)
         return a, f"absolute: {why}"
-    if wish == "auto":
+    require_rotor_coordinates(c.structure)
+    if needed:
+        why = "the inertia of a rotor is along a joint's coordinate"
+    elif wish == "auto":
         there = _evaluation_cost(c.structure)
         if here <= there:
             return (

@@ -125,7 +125,7 @@ class _Settling:
         self.scene, self.stepper, self.held, self.t, self.h = scene, stepper, held, base.t, h
         c = base.compiled
         self.size = c.values.length
-        vdot = MechanismState.moving(c, base.t, base.q, 0.0 * base.v).vdot
+        vdot = MechanismState.moving(c, base.t, base.q, 0.0 * base.v, rotors=False).vdot
         self.usual = float(np.abs(vdot * self.size / c.sizes).max(initial=0.0))  # acceleration without contact
 
     def walk(self, name: str) -> None:

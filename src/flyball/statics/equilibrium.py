@@ -116,7 +116,7 @@ def _with_sizes(x: RestState) -> RestState:
     """
     e = replace(x, lam=0.0 * x.lam).equations
     refuse_contradicting_limits(x.c, x.t)
-    moving = EquationDerivatives(MechanismState.moving(x.c, x.t, x.q, e.state.v))
+    moving = EquationDerivatives(MechanismState.moving(x.c, x.t, x.q, e.state.v, rotors=False))
     return replace(x, sizes=state_sizes(moving)).balanced()
 
 

@@ -29,6 +29,7 @@ from ..model.quantities import single_quantity
 from ..model.unsupported_elements import refuse_sampled_controllers, refuse_unsupported, unsupported_elements
 from ..results.linear_model import LinearModel
 from ..results.wording import NOT_JUDGED, STABLE
+from ..simulation.initial_state import choose_coordinates
 from ..simulation.method_choice import SimulateOptions
 from ..simulation.prescribed_motion import is_checked_afterwards
 from ..simulation.simulate import simulate
@@ -299,6 +300,8 @@ class InstantAnalysis(RunAnalysis):
     def run(self, model: Model, o: AssembleOptions) -> Any:
         """The state as a result with one time."""
         a = assemble(model, t=o.t, parameters=o.parameters)
+        if a.compiled.structure.missed_rotors:
+            a, _ = choose_coordinates(a, "joint", o.parameters)
         return snapshot(MechanismState.moving(a.compiled, a.t, a.q, a.v))
 
     def named(self, model: Model, text: Any) -> StudyQuantity:

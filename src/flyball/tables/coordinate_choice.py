@@ -15,7 +15,9 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from ..errors import ModelError
 from ..model.body import GROUND
+from ..model.force import CoordinateForce
 from ..model.joint import Joint
 from ..model.model import Model
 from .constraint_rows import released_joints
@@ -24,6 +26,7 @@ from .law_inputs import forces_in_events
 from .structure_definition import Structure
 from .table_definitions import ARTICULATED, POINT, SCHUR
 
+MOST_ROWS = 6  # rows that a joint can have
 MAX_FORESTS = 8  # choices that are cached for each mechanism
 
 
@@ -35,21 +38,49 @@ def rows_saved(joint: Joint, planar: bool) -> int:
 def tree_candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
     """Joints that can be tree joints -> rows saved.
 
-    Excluded are joints whose reaction a friction or an event needs, those that an event releases, and those of point
-    masses, which have no rotation.
+    A joint with the inertia of a rotor is chosen before all others. Excluded are joints whose reaction a friction
+    or an event needs, those that an event releases, and those of point masses, which have no rotation.
     """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
     needed |= {joint.name for joint in released_joints(model)} | {
         x.element.name for x in forces_in_events(model).values()
     }
     alone = point_masses(model)
+    turning = {f.coordinate_text().partition(".")[0] for f in rotors(model)}
     out = {}
     for joint in model.joints:
         worth = rows_saved(joint, model.planar)
         a, b = joint_bodies(model, joint)
         if worth > 0 and a != b and alone.isdisjoint((a, b)) and joint.name not in needed and joint.name not in avoided:
-            out[joint.name] = worth
+            out[joint.name] = worth + (MOST_ROWS if joint.name in turning else 0)
     return out
+
+
+def rotors(model: Model) -> list[CoordinateForce]:
+    """Elements that add inertia along a coordinate, which must then be one of the joint coordinates."""
+    return [f for f in model.forces if isinstance(f, CoordinateForce) and f.adds_inertia]
+
+
+def require_rotor_coordinates(s: Structure) -> None:
+    """Refuse to solve for accelerations where the inertia of a rotor is not along a velocity.
+
+    Raises
+    ------
+    ModelError
+        Naming the element, its coordinate and the remedy.
+    """
+    for e in s.missed_rotors:
+        text = e.coordinate_text()
+        if not s.tree:
+            raise ModelError(
+                f"{e.title} adds inertia along {text!r}, which is a velocity in joint coordinates only; "
+                "choose coordinates='joint'"
+            )
+        raise ModelError(
+            f"{e.title} adds inertia along {text!r}, which is not a velocity in joint coordinates: the loop is cut at "
+            "its joint, or a friction or an event needs the reaction of that joint. Describe the rotor as a Body on a "
+            "Revolute joint, with a GearPair"
+        )
 
 
 def spanning_joints(model: Model, avoided: Collection[str] = ()) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from ..model.event import Event
 from ..model.force import CoordinateForce, Force
 from ..model.quantities import Curve, measured_quantity, transmitted_force
 from .constraint_rows import coordinate_frames, coordinate_term, measured_term
+from .forest import coordinate_row
 from .structure_definition import Structure, frame_index
 from .table_definitions import FORCE_BY_ADDRESS, SLIDING, Forces
 
@@ -127,6 +128,18 @@ def fill_force_table(s: Structure) -> None:
         if not e.conservative():
             table.work[k] = s.state(f"{e.name}.work")
     s.tables["forces"] = table
+
+
+def place_rotors(s: Structure) -> None:
+    """Find the velocities to which elements add inertia."""
+    for e in s.forces:
+        if isinstance(e, CoordinateForce) and e.adds_inertia:
+            joint, what = s.model.coordinate(e.coordinate_text(), e)
+            row = coordinate_row(s, joint.name, what)
+            if row is None:
+                s.missed_rotors.append(e)
+            else:
+                s.rotors.append((e, int(s.tables["tree"].v[row])))
 
 
 def user_formulas(cls: type[Force]) -> CodeTable | None:

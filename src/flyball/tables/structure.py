@@ -273,6 +273,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     if c.switches:
         constraint_rows.add_switch_rows(s)
     forces.fill_force_table(s)
+    forces.place_rotors(s)
     law_inputs.add_controller_laws(s)
     if c.switches:
         constraint_rows.add_event_guards(s)

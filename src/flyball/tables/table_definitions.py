@@ -282,6 +282,7 @@ class System(NamedTuple):
     scales: Scales
     units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
     velocity_units: Number1  # (nv,): the same of each coordinate whose rate is a velocity
+    rotor_inertia: Number1  # (nv,): inertia that rotors add to the mass matrix along each velocity [kg], [kg m^2]
     row_levers: Number1  # (nr,): factor that turns the value of a row into a length: 1, or of angles the length [m]
     entry_sizes: Number1  # (nG,): size of each entry of Work.G for the length of a body
     mass_entries: MassEntries
@@ -293,7 +294,7 @@ class System(NamedTuple):
 
 NUMBERS = (
     "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
-    "velocity_units", "row_levers", "entry_sizes",
+    "velocity_units", "rotor_inertia", "row_levers", "entry_sizes",
 )  # fmt: skip
 """Fields of `System` that hold floats: they change with parameters, and may be complex, or expressions."""
 

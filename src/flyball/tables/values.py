@@ -168,7 +168,11 @@ def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Value
     const, curve_at = _constants(s, given.of, given.env, dtype)
     terms = _term_parameters(s, pose, {}, curve_at, refresh.table("term_parameters", S.term_parameters, dtype), refresh)
     gravity = np.array(s.model.gravity_vector(given.env), dtype)
-    same = *zip(frames, S.frames, strict=True), (terms, S.term_parameters), (gravity, S.gravity)
+    rotors = _rotor_inertia(s, given.of, dtype)
+    same = (
+        *zip(frames, S.frames, strict=True), (terms, S.term_parameters), (gravity, S.gravity),
+        (rotors, S.rotor_inertia),
+    )  # fmt: skip
     if any(a.tobytes() != b.tobytes() for a, b in same):
         return None
     forces = _force_parameters(s, pose, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
@@ -211,6 +215,7 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
         velocity_units=_velocity_units(s, length, dtype),
+        rotor_inertia=_rotor_inertia(s, numbers, dtype),
         row_levers=length / _row_units(s, terms, length),
         entry_sizes=_entry_sizes(s, terms, _body_length(s, frames.position, length)),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
@@ -276,6 +281,14 @@ def _units(s: Structure, length: Any) -> list[Any]:
 def _velocity_units(s: Structure, length: Any, dtype: Any) -> np.ndarray:
     """Unit of each coordinate whose rate is a velocity: the length or a radian."""
     return np.array([length if n.unit == "m" else 1.0 for n in velocity_names(s)], dtype)
+
+
+def _rotor_inertia(s: Structure, numbers: Mapping[str, SimpleNamespace], dtype: Any) -> np.ndarray:
+    """Inertia that rotors add to the mass matrix along each velocity, (nv,)."""
+    out = np.zeros(s.nv, dtype)
+    for rotor, d in s.rotors:
+        out[d] += rotor.added_inertia(numbers[rotor.name])
+    return out
 
 
 def _row_units(s: Structure, terms: np.ndarray, length: Any) -> np.ndarray:

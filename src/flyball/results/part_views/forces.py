@@ -70,7 +70,11 @@ class ForceView(PartView):
             load = e.load(
                 force_row(S.force_parameters, k), self._result.motions.frame(int(S.forces.M[k])), force, torque
             )
-        return x, rate, e.effort(force_row(S.force_parameters, k), x, rate, laws, load) + 0.0 * x
+        effort = e.effort(force_row(S.force_parameters, k), x, rate, laws, load) + 0.0 * x
+        for rotor, d in self._x.structure.rotors:
+            if rotor is e:
+                effort = effort - e.added_inertia(self._x.numbers[e.name]) * self._result.vdot[:, d]
+        return x, rate, effort
 
     def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
         """Return the sliding direction: as recorded by its switch; without a switch the sign of the rate."""

@@ -51,12 +51,15 @@ from .stepping_tables import (
 
 @formula
 def kinetic_energy(A):
-    """Return the kinetic energy at the kinematics in the engine's workspace."""
+    """Return the kinetic energy at the state of the mechanism, with the kinematics in the engine's workspace."""
     total = 0.0
     for b in range(A.S.tree.parent.shape[0]):
         v = load3(A.W.bodies.velocity, b, 0)
         w = mtv(load9(A.W.bodies.rotation, b, 0), load3(A.W.bodies.angular_velocity, b, 0))
         total += 0.5 * A.S.bodies.mass[b] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.bodies.inertia, b, 0), w))
+        for d in range(A.S.tree.v[b], A.S.tree.v[b] + A.S.tree.nv[b]):
+            u = A.clock.y.current[A.S.sizes.coordinates + d]
+            total += 0.5 * A.S.rotor_inertia[d] * u * u
     return total
 
 

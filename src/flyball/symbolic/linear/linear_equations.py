@@ -18,7 +18,7 @@ from ...model.model import Model
 from ...results.equilibrium import Equilibrium
 from ...results.result import Result
 from ...results.wording import with_unit
-from ...tables.coordinate_choice import spanning_joints
+from ...tables.coordinate_choice import rotors, spanning_joints
 from ..explicit.linear_systems import nominal_value
 from ..expressions import Expressions, SymbolTable
 from .derivatives import Derivatives, Perturbed, TracedMechanism, refuse_unknown, trace_mechanism
@@ -422,7 +422,7 @@ def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMecha
         return m, OperatingPoint(x.q.tolist(), v.tolist(), x.z.tolist(), x.t)
     tree = o.tree
     if tree is None:
-        tree = spanning_joints(model) if o.coordinates == "joint" else ()
+        tree = spanning_joints(model) if o.coordinates == "joint" or rotors(model) else ()
     m = trace_mechanism(model, tree, o.inputs, o.parameters)
     return m, reference_or_given(m, o.at)
 
