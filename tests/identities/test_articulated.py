@@ -51,7 +51,7 @@ def tables(parents, kinds):
     nv = np.array([TREE_NV[k] for k in kinds])
     parent, joint, none = np.array(parents, np.int64), np.array(kinds, np.int64), np.full(len(nv), -1)
     hung = Tree(parent, joint, np.zeros_like(nv), np.cumsum(nv) - nv, np.zeros_like(nv), nv, none, none.copy())
-    return SimpleNamespace(tree=hung, bodies=zero_table(Bodies, len(parents), float))
+    return SimpleNamespace(tree=hung, bodies=zero_table(Bodies, len(parents), float), rotor_inertia=np.zeros(nv.sum()))
 
 
 def rotation(random):
@@ -89,13 +89,15 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
             W.twists.linear[v0] = n
         elif kind == SPHERICAL:
             W.twists.angular[v0 : v0 + 3] = np.reshape(rotation(random), (3, 3))
+    turning = random.random(len(S.rotor_inertia)) < 0.3
+    S.rotor_inertia[turning] = random.uniform(0.0, 5.0, turning.sum())
     return S, W
 
 
 def dense(S, W):
-    """M as the sum over bodies of J^T m J."""
+    """M as the sum over bodies of J^T m J, and the inertias of rotors on its diagonal."""
     nb, nv = len(S.tree.parent), W.twists.shape[0]
-    M = np.zeros((nv, nv), W.twists.dtype)
+    M = np.diag(S.rotor_inertia).astype(W.twists.dtype)
     for b in range(nb):
         J = np.zeros((6, nv), W.twists.dtype)
         a = b
