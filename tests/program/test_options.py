@@ -24,7 +24,7 @@ from flyball.sensitivity import sensitivity
 from flyball.simulation.method_choice import AUTO_METHOD, IMPLICIT_METHODS, IMPULSE_METHOD
 from flyball.studies import study
 from flyball.studies.sampling import LISTED_DESIGNS, SAMPLED_DESIGNS
-from flyball.symbolic.export.code import LANGUAGES
+from flyball.symbolic.export import LANGUAGES
 
 FAMILIES = (MotionMethods, StaticsMethods, DesignMethods, MobilityMethods)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}

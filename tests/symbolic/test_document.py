@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.errors import ModelError
 from flyball.expression_graph.evaluation import evaluate, symbols_of
 from flyball.expression_graph.graph import Node
-from flyball.symbolic.document.parts import Formulas, Matrix
+from flyball.symbolic.document_formats import Formulas, Matrix
 from tests.mechanisms import example
 
 

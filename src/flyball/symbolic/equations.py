@@ -28,15 +28,15 @@ from ..results.result import Result
 from ..tables.structure import Choices, structure
 from ..tables.table_definitions import FREE
 from ..tables.values import values
-from .coordinates import CoordinateChoice, initial_assembly
-from .document.document import document
-from .document.parts import Document
-from .document.writers import latex_document, text_document
+from .document_formats import Document, latex_document, text_document
+from .equations_document import document
 from .expressions import Expressions, SymbolTable
 from .named_equations import (
+    CoordinateChoice,
     CurveParameter,
     NamedEquations,
     curve_parameters_at,
+    initial_assembly,
     quaternions,
     state_by_symbol,
     trace_named_equations,
@@ -44,9 +44,8 @@ from .named_equations import (
 
 if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
-    from .explicit.explicit_equations import ExplicitEquations
-    from .explicit.state_space import StateEquations
-    from .export.code import Code
+    from .explicit.explicit_equations import ExplicitEquations, StateEquations
+    from .export import Code
     from .joint_equations import JointEquations
     from .lagrange import Lagrange
     from .linear.linear_equations import LinearEquations
@@ -633,7 +632,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         SingularityError
             If the reference configuration is a singular position.
         """
-        from .explicit.state_space import StateEquations
+        from .explicit.explicit_equations import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
 
@@ -666,7 +665,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         name: str = "",
     ) -> Code:
         """Functions of these equations as code: see `Mechanism.export`."""
-        from .export.code import export_equations
+        from .export import export_equations
 
         return export_equations(self, folder, language=language, functions=functions, outputs=outputs, name=name)
 

@@ -30,8 +30,7 @@ import numpy as np
 from ...expression_graph.evaluation import directional_derivatives, evaluate, nodes_in_order, substitute, symbols_of
 from ...expression_graph.graph import NUMBER, Graph, Node, Symbol
 from ...math.scalar import atan2, cos, rounded, sin, sqrt
-from .definitions import Definition
-from .zero_test import Probe
+from .definitions import Definition, Probe
 
 Affine = tuple[Any, list[tuple[Any, Any]]]
 """Constant, and the coefficients of cosine and sine of each angle."""

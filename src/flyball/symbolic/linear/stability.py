@@ -16,7 +16,7 @@ import numpy as np
 
 from ...expression_graph.evaluation import evaluate
 from ...expression_graph.graph import Node
-from .equilibrium import Validity
+from .operating_point import Validity
 from .polynomials import PolynomialRing, SignAnalysis, determinant, inequality_sides, readable_coefficients
 from .transfer_functions import checked_values
 

@@ -27,10 +27,9 @@ from ...expression_graph.evaluation import evaluate
 from ...expression_graph.graph import Node, zero_objects
 from ...model.messages import listing, suggest
 from ...results.wording import with_unit
-from .derivatives import Perturbed, TracedMechanism
-from .equilibrium import Validity
+from .operating_point import Validity
 from .polynomials import PolynomialRing, determinant
-from .reduction import Freedoms, replaced
+from .state_matrices import Freedoms, Perturbed, TracedMechanism, replaced
 
 
 @dataclass
