@@ -11,8 +11,7 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import evaluate, symbols_of
-from flyball.expression_graph.graph import Node
+from flyball.expression_graph.graph import Node, evaluate, symbols_of
 from flyball.symbolic.document_formats import Formulas, Matrix
 from tests.mechanisms import example
 

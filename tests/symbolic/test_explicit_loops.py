@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.expression_graph.evaluation import evaluate
-from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.graph import Graph, Symbol, evaluate
 from flyball.symbolic.explicit.closed_form_loops import solve_single
 from flyball.symbolic.explicit.definitions import Probe
 from tests.analyses.linkages import whitworth

@@ -43,8 +43,7 @@ from ..expression_graph.printers.llvm import (
 )
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, named_arrays
-from .machine_code import target_description
-from .store import sources_digest
+from .machine_code import sources_digest, target_description
 
 LANES = 4
 TASKS = (INVERSE_DYNAMICS, MASS_MATRIX, FORWARD_DYNAMICS, INVERSE_DERIVATIVES, FORWARD_DERIVATIVES)

@@ -18,8 +18,7 @@ import numpy as np
 from ..analysis_options import Options
 from ..assembly.assembled_state import Assembly
 from ..errors import AnalysisError, ModelError
-from ..expression_graph.evaluation import expanded_symbol_count
-from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, object_vector
+from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, expanded_symbol_count, object_vector
 from ..model.expressions import is_number_text
 from ..model.model import Model
 from ..model.output_files import LATEX, PAGE, write_file

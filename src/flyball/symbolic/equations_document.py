@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..constraints import blocks as building
-from ..expression_graph.evaluation import nodes_in_order
-from ..expression_graph.graph import MULTIPLY, NUMBER, SYMBOL, Node, Symbol
+from ..expression_graph.graph import MULTIPLY, NUMBER, SYMBOL, Node, Symbol, nodes_in_order
 from ..expression_graph.printers.formula_layout import latex_symbol
 from ..expression_graph.printers.latex import latex
 from ..expression_graph.printers.text import text
-from ..expression_graph.simplification.common_subexpressions import Definitions, extract_common_subexpressions
-from ..expression_graph.simplification.reading_cost import symbol_count
-from ..expression_graph.simplification.simplify import simplified
+from ..expression_graph.simplification.factors import symbol_count
+from ..expression_graph.simplification.simplify import Definitions, extract_common_subexpressions, simplified
 from ..model.joint import Joint
 from ..model.messages import kind_in_words
 from .document_formats import (

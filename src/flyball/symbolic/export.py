@@ -29,8 +29,16 @@ import numpy as np
 
 from ..engine.solve import apply_inverse_mass, factor_schur
 from ..errors import ModelError
-from ..expression_graph.evaluation import jacobian, nodes_in_order, substitute, symbols_of
-from ..expression_graph.graph import SYMBOL, Node, object_vector, zero_objects
+from ..expression_graph.graph import (
+    SYMBOL,
+    Node,
+    jacobian,
+    nodes_in_order,
+    object_vector,
+    substitute,
+    symbols_of,
+    zero_objects,
+)
 from ..expression_graph.printers.c import c_sources
 from ..expression_graph.printers.casadi import casadi_functions
 from ..expression_graph.printers.numba import numba_module

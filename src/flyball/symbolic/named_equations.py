@@ -34,8 +34,18 @@ from ..engine.kinematics import load_record, twist_column
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
 from ..engine.rows import row_parameters
 from ..errors import AnalysisError, ModelError
-from ..expression_graph.evaluation import evaluate, evaluate_array, nodes_in_order
-from ..expression_graph.graph import ADD, MULTIPLY, NUMBER, Graph, Node, Symbol, object_vector
+from ..expression_graph.graph import (
+    ADD,
+    MULTIPLY,
+    NUMBER,
+    Graph,
+    Node,
+    Symbol,
+    evaluate,
+    evaluate_array,
+    nodes_in_order,
+    object_vector,
+)
 from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations, with_prescribed_rows
 from ..math.scalar import atan2
 from ..math.spline import BREAKS

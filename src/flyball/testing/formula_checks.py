@@ -20,8 +20,7 @@ from ..constraints.registry import SIGNATURES as ROWS
 from ..constraints.switches.guard_kinds import HELD, OFF, STEADY
 from ..constraints.switches.guard_kinds import SIGNATURES as GUARDS
 from ..errors import ModelError
-from ..expression_graph.evaluation import evaluate
-from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision
+from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision, evaluate
 from ..forces import SIGNATURES
 from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce, Force

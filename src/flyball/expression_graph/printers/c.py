@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..evaluation import nodes_in_order
-from ..graph import Function
+from ..graph import Function, nodes_in_order
 from .routines import (
     Argument,
     Identifiers,

@@ -27,8 +27,17 @@ from typing import Any
 
 import numpy as np
 
-from ...expression_graph.evaluation import directional_derivatives, evaluate, nodes_in_order, substitute, symbols_of
-from ...expression_graph.graph import NUMBER, Graph, Node, Symbol
+from ...expression_graph.graph import (
+    NUMBER,
+    Graph,
+    Node,
+    Symbol,
+    directional_derivatives,
+    evaluate,
+    nodes_in_order,
+    substitute,
+    symbols_of,
+)
 from ...math.scalar import atan2, cos, rounded, sin, sqrt
 from .definitions import Definition, Probe
 

@@ -27,8 +27,7 @@ import numpy as np
 from ...derivatives.linear_reduction import product
 from ...derivatives.reduced_equations import gap_lengths, lost_constraints, normalised_rows
 from ...errors import ModelError, SingularityError
-from ...expression_graph.evaluation import evaluate, evaluate_array, jacobian, nodes_in_order, symbols_of
-from ...expression_graph.graph import Node, zero_objects
+from ...expression_graph.graph import Node, evaluate, evaluate_array, jacobian, nodes_in_order, symbols_of, zero_objects
 from ...expression_graph.tracing import TracedEquations
 from ...model.model import listing, suggest
 from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank

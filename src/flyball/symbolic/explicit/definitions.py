@@ -18,8 +18,7 @@ import numpy as np
 
 from ...derivatives.linear_reduction import product
 from ...errors import AnalysisError, SingularityError
-from ...expression_graph.evaluation import evaluate, jacobian, symbols_of
-from ...expression_graph.graph import CALL, NUMBER, OPERATIONS, SYMBOL, Node
+from ...expression_graph.graph import CALL, NUMBER, OPERATIONS, SYMBOL, Node, evaluate, jacobian, symbols_of
 from .linear_systems import Determinants, solve_blocks
 
 RANDOM_POINTS = 5

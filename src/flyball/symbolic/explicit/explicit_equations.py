@@ -15,14 +15,21 @@ import numpy as np
 from ...derivatives.linear_reduction import product
 from ...derivatives.reduced_equations import gap_lengths, normalised_rows
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import directional_derivatives, evaluate, jacobian, symbols_of
-from ...expression_graph.graph import Node, OpaqueFunction, Symbol
-from ...expression_graph.simplification.arctangents import (
+from ...expression_graph.graph import (
+    Node,
+    OpaqueFunction,
+    Symbol,
+    directional_derivatives,
+    evaluate,
+    jacobian,
+    symbols_of,
+)
+from ...expression_graph.simplification.factors import symbol_count
+from ...expression_graph.simplification.simplify import (
     ArctangentSubstitution,
     fast_simplification,
     without_whole_turns,
 )
-from ...expression_graph.simplification.reading_cost import symbol_count
 from ...expression_graph.tracing import TracedEquations
 from ...model.body import Driver
 from ...model.model import suggest

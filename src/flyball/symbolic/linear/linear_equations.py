@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import evaluate, substitute, symbols_of
-from ...expression_graph.graph import Node, Symbol
+from ...expression_graph.graph import Node, Symbol, evaluate, substitute, symbols_of
 from ...linear.operating_point import operating_state
 from ...model.messages import listing, suggest
 from ...model.model import Model

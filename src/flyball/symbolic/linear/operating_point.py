@@ -20,8 +20,22 @@ from ...derivatives.force_balance import usual_states
 from ...derivatives.linear_reduction import product
 from ...derivatives.reduced_equations import gap_lengths, lost_constraints
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute, symbols_of
-from ...expression_graph.graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, OPERATIONS, SYMBOL, Node, zero_objects
+from ...expression_graph.graph import (
+    ADD,
+    CALL,
+    DIVIDE,
+    MULTIPLY,
+    NUMBER,
+    OPERATIONS,
+    SYMBOL,
+    Node,
+    evaluate,
+    jacobian,
+    nodes_in_order,
+    substitute,
+    symbols_of,
+    zero_objects,
+)
 from ...model.body import Initial
 from ...model.expressions import number as number_of
 from ...model.messages import listing, suggest

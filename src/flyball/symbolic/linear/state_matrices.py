@@ -30,8 +30,16 @@ from ...derivatives.linear_reduction import (
 from ...derivatives.reduced_equations import massless_motion_error, pivot_rows
 from ...engine.kinematics import quaternion_at
 from ...errors import ModelError
-from ...expression_graph.evaluation import directional_derivatives, evaluate, substitute
-from ...expression_graph.graph import Graph, Node, Symbol, object_vector, zero_objects
+from ...expression_graph.graph import (
+    Graph,
+    Node,
+    Symbol,
+    directional_derivatives,
+    evaluate,
+    object_vector,
+    substitute,
+    zero_objects,
+)
 from ...expression_graph.tracing import (
     TracedEquations,
     object_tables,

@@ -23,8 +23,7 @@ import numpy as np
 
 from ...derivatives.linear_reduction import product
 from ...errors import ModelError, import_optional
-from ...expression_graph.evaluation import evaluate
-from ...expression_graph.graph import Node, zero_objects
+from ...expression_graph.graph import Node, evaluate, zero_objects
 from ...model.messages import listing, suggest
 from ...results.wording import with_unit
 from .operating_point import Validity
