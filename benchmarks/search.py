@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 
-from flyball.collision.broad_phase.workspace import Search
 from flyball.collision.contact_finder import ContactFinder, no_movers
 from flyball.collision.contact_search import REBUILD, STEP
 from flyball.collision.shape_kinds import PLANE, SPHERE
@@ -18,6 +17,7 @@ from flyball.collision.tables import (  # fmt: skip
     Dimensions,
     Geometry,
     Movers,
+    Search,
     Shapes,
 )
 from flyball.compiler.formulas import call, formula

@@ -10,16 +10,27 @@ import numpy as np
 
 from ..compiler.kernels import Kernel
 from ..errors import ModelError
-from .broad_phase.workspace import (
+from .contact_search import REBUILD, STEP, search
+from .narrow_phase.primitives import SCRATCH_ROWS
+from .shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, PLANE, POLYGON, SPHERE
+from .tables import (
+    DONE,
+    FULL_CONTACTS,
+    FULL_PAIRS,
     IS_GENERIC,
     IS_PLANE,
     MAX_CLASSES,
+    NOT_FINITE,
     SIZE_LEVELS,
     Bounds,
+    ContactCounts,
+    Contacts,
     Envelopes,
+    Geometry,
     LevelCells,
     LevelGrid,
     Motions,
+    Movers,
     MovingFrame,
     PairTable,
     Planes,
@@ -29,19 +40,6 @@ from .broad_phase.workspace import (
     SizeGroups,
     SlotPairs,
     Slots,
-)
-from .contact_search import REBUILD, STEP, search
-from .narrow_phase.primitives import SCRATCH_ROWS
-from .shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, PLANE, POLYGON, SPHERE
-from .tables import (
-    DONE,
-    FULL_CONTACTS,
-    FULL_PAIRS,
-    NOT_FINITE,
-    ContactCounts,
-    Contacts,
-    Geometry,
-    Movers,
     no_contacts,
 )
 

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...collision.broad_phase.workspace import Search
 from ...collision.contact_search import MIDWAY, NEW_VELOCITIES
 from ...collision.contact_search import STEP as STEP_ON
 from ...collision.tables import (
@@ -19,6 +18,7 @@ from ...collision.tables import (
     Contacts,
     Geometry,
     Movers,
+    Search,
 )
 from ...compiler.formulas import call, formula
 from ...compiler.kernels import kernel
