@@ -24,7 +24,7 @@ from ..mobility.null_spaces import jacobian_rank, scaled_jacobian
 from ..model.body import Driver
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_unsupported
-from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE
+from ..numerics.rank import MAX_DOUBTFUL_SVD_SIZE
 from ..progress import no_progress, progress_bar
 from ..results.mobility import Mobility
 from ..results.result import Result

@@ -16,7 +16,7 @@ from ..engine.entry_point import characteristic_rate_within
 from ..errors import AnalysisError, ModelError, import_optional
 from ..model.model import listing, suggest
 from ..numerics.eigen import QuadraticPencil
-from ..numerics.sparse_rank import saddle_point_solver
+from ..numerics.rank import saddle_point_solver
 from .wording import with_unit
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly, undefined_row
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switches.guard_kinds import OFF
+from ..constraints.switches.switch_kind import OFF
 from ..engine import motion
 from ..engine.entry_point import MOTION
 from ..engine.kinematics import load_record

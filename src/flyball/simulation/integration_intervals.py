@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switches.guard_kinds import G_LAW
+from ..constraints.switches.switch_kind import G_LAW
 from ..engine.pulse_detection import law_starts
 from ..engine.sampled_controllers import INSTANT_TOLERANCE, SampledControllers, SamplePlan
 from ..errors import ModelError

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..compiler.announcements import compiled_since
+from ..compiler.object_files import compiled_since
 from ..engine.entry_point import COMPLETE, INTEGRATE, MOTION, run_task
 from ..engine.pulse_detection import INSPECTION_ROWS
 from ..errors import SimulationError

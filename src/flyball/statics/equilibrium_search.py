@@ -34,7 +34,7 @@ from ..engine.kinematics import retract
 from ..errors import ModelError, NotConverged, SingularityError
 from ..model.joint import Joint
 from ..model.messages import listing, suggest
-from ..numerics.sparse_rank import clearly_independent
+from ..numerics.rank import clearly_independent
 from ..results.equilibrium import Equilibrium
 from ..simulation.initial_state import choose_coordinates
 from ..tables.forest import coordinate_row

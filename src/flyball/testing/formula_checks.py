@@ -17,8 +17,8 @@ import numpy as np
 from ..compiler.kernels import CodeTable, FormulaCode, Signature, short_reason
 from ..constraints.blocks import ConstraintRow
 from ..constraints.registry import SIGNATURES as ROWS
-from ..constraints.switches.guard_kinds import HELD, OFF, STEADY
-from ..constraints.switches.guard_kinds import SIGNATURES as GUARDS
+from ..constraints.switches.switch_kind import HELD, OFF, STEADY
+from ..constraints.switches.switch_kind import SIGNATURES as GUARDS
 from ..errors import ModelError
 from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision, evaluate
 from ..forces import SIGNATURES

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..constraints.switches.guard_kinds import FROZEN, OFF
+from ..constraints.switches.switch_kind import FROZEN, OFF
 from ..model.element import written_fields
 from ..model.joint import Joint
 from ..model.model_files import dumps

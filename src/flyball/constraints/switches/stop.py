@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import AT_REST, BILATERAL, NO_IMPULSE, UNILATERAL
-from .guard_kinds import G_LOWER, G_PULL, G_UPPER, OFF
-from .switch_kind import ONE_SIDED, Instant, ProblemRow, SwitchKind
+from .switch_kind import G_LOWER, G_PULL, G_UPPER, OFF, ONE_SIDED, Instant, ProblemRow, SwitchKind
 
 
 class Stop(SwitchKind):

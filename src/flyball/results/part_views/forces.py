@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import BY_RATE, HELD
+from ...constraints.switches.switch_kind import BY_RATE, HELD
 from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
 from ...errors import AnalysisError

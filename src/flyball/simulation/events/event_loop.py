@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import (
+from ...constraints.switches.switch_kind import (
     DISTANCE_GUARDS,
     FORCE_GUARDS,
     G_BACK,

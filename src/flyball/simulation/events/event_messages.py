@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import BY_RATE, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF
-from ...constraints.switches.switch_kind import DISC, ONE_SIDED
+from ...constraints.switches.switch_kind import BY_RATE, DISC, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF, ONE_SIDED
 from ...errors import ModelError
 from ...model.contact_point import Touch
 from ...model.joint import Joint

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import G_CORNER, HELD, OFF, STEADY
+from ...constraints.switches.switch_kind import G_CORNER, HELD, OFF, STEADY
 from ...engine.calls import MOTION
 from ...engine.guards import corner_value
 from ...engine.mode_complementarity import RATE_ROUNDING, VELOCITY_ROUNDING

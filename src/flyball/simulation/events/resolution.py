@@ -13,7 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...constraints.switches.elastic_stop import pressed_side
-from ...constraints.switches.guard_kinds import (
+from ...constraints.switches.switch_kind import (
+    DISC,
     FORCE_GUARDS,
     FROZEN,
     G_CORNER,
@@ -26,7 +27,6 @@ from ...constraints.switches.guard_kinds import (
     PRESS_GUARDS,
     RATE_GUARDS,
 )
-from ...constraints.switches.switch_kind import DISC
 from ...engine.mode_complementarity import STEP_IMPULSES, SUDDEN_IMPULSES, TERM_ROUNDING
 from ...model.contact_point import Touch
 from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, NO_IMPULSE, NO_SOLUTION, SOLUTION_FOUND

@@ -14,7 +14,7 @@ import numpy as np
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ...assembly.positions_and_velocities import described_velocities
-from ...compiler.announcements import compiled_since
+from ...compiler.object_files import compiled_since
 from ...errors import AnalysisError, SimulationError
 from ...math.vec import mtv, quaternion_matrix
 from ...mobility.mobility import mobility
@@ -35,18 +35,20 @@ from ..integration_intervals import PAUSED_MESSAGE, Segment, whole_motion
 from ..integration_options import Stepping
 from .setup import (
     MechanismMotion,
+    StepSize,
     assembled_start,
+    choose_step,
     make_stepper,
     movers_of_assembly,
     partition_bodies,
     place_body_sets,
     place_movers,
     separate_mechanism,
+    smallest_radius,
     values_with_stops,
     with_earlier_energy,
 )
 from .step_loop import solver_counts
-from .step_size import StepSize, choose_step, smallest_radius
 from .stepper import ImpulseStepper, NoSolution
 from .stepping_tables import (
     RunSums,

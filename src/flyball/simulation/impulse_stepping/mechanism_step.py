@@ -21,17 +21,20 @@ from ...math.scalar import sqrt
 from ...math.vec import dot, load3, load9, mtv, mv, store3, store9
 from ...numerics.complementarity.contact_problem import ContactProblem, ContactState
 from ...tables.table_definitions import SCHUR
-from .implicit_springs import (
+from .mechanism_rows import (
+    account_lines,
     correct_spring_lengths,
     dot_rows,
     find_implicit_springs,
     impulse_response,
+    keep_stops_only,
+    mechanism_contact_rows,
     save_spring_biases,
     save_spring_lengths,
     spring_impulse,
+    update_friction_loads,
     with_spring_response,
 )
-from .mechanism_rows import account_lines, keep_stops_only, mechanism_contact_rows, update_friction_loads
 from .stepping_tables import (
     NOT_CONVERGED,
     TASK_APPLY_IMPULSES,

@@ -33,17 +33,6 @@ from ...numerics.complementarity.contact_problem import (
 )
 from ...numerics.complementarity.solver_choice import SMALL_ISLAND_SOLVER, IslandSolver, prepare_solver
 from ...tables.table_definitions import Surfaces
-from .compliant_contact import (
-    FEW_LAW_ITERATIONS,
-    LAW_ITERATIONS,
-    find_compliant_contacts,
-    law_is_met,
-    linearise_compliant_rows,
-    remaining_gap,
-    restore_free_velocities,
-    start_compliant_rows,
-    store_elastic_energy,
-)
 from .contact_constraints import (
     account_contact,
     account_rolling,
@@ -59,6 +48,21 @@ from .contact_constraints import (
     static_friction_of_sticking,
     warm_start,
 )
+from .contact_laws import (
+    FEW_LAW_ITERATIONS,
+    IMPACT_ROUNDS,
+    LAW_ITERATIONS,
+    clear_impact_impulses,
+    find_compliant_contacts,
+    find_impacts,
+    law_is_met,
+    linearise_compliant_rows,
+    remaining_gap,
+    resolve_impacts,
+    restore_free_velocities,
+    start_compliant_rows,
+    store_elastic_energy,
+)
 from .free_bodies import (
     clear_velocities,
     displace_bodies,
@@ -66,7 +70,6 @@ from .free_bodies import (
     start_from_free_velocities,
     velocities_without_contact,
 )
-from .restitution import IMPACT_ROUNDS, clear_impact_impulses, find_impacts, resolve_impacts
 from .stepping_tables import (
     MIDDLE_FOUND,
     NO_SOLUTION,
