@@ -26,7 +26,7 @@ from .model.unsupported_elements import ignored_elements
 from .results.health import changed_velocities, velocity_not_allowed
 from .results.mechanism_report import BodyReport, MassProperties, MassReport, Report
 from .results.mobility import Mobility
-from .results.recorded_kinematics import RecordedMotion
+from .results.motion_record import RecordedMotion
 from .simulation.law_faults import out_of_table_at_start
 from .tables.contact_tables import Carriers, contact_carriers
 from .tables.structure import structure

@@ -31,7 +31,7 @@ from ..model.table import Table
 from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, fundamental_subspaces, rank_by_pivots
 from ..results.inverse_dynamics import Drive, InverseDynamics
-from ..results.recorded_kinematics import RecordedMotion
+from ..results.motion_record import RecordedMotion
 from ..results.result import Result
 from ..simulation.prescribed_motion import is_checked_afterwards
 from ..tables.table_definitions import PLANAR, POINT

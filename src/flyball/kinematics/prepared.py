@@ -26,7 +26,7 @@ from ..laws.bytecode import evaluate_jet
 from ..laws.python_functions import function_fault
 from ..model.model import Model
 from ..model.unsupported_elements import acts_while_sliding, refuse_unsupported
-from ..results.recorded_kinematics import FULL_TURN
+from ..results.motion_record import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names

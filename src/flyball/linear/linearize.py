@@ -1,6 +1,6 @@
 """Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
 
-With inputs that move the mechanism (drivers, lengths) the reduced equations (see `linear_reduction`) contain rates of
+With inputs that move the mechanism (drivers, lengths) the reduced equations (see `reduced_equations`) contain rates of
 inputs, which a change of state eliminates.
 """
 
@@ -17,16 +17,18 @@ from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
 from ..derivatives.force_balance import state_sizes
-from ..derivatives.linear_reduction import InputTerms, ReducedEquations, state_names
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.reduced_equations import (
     FreeCoordinates,
+    InputTerms,
     MatrixUncertainty,
+    ReducedEquations,
     TurningFrame,
     free_coordinates,
     reduced_equations,
     refuse_singular_position,
+    state_names,
 )
 from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
 from ..errors import ModelError
@@ -37,8 +39,8 @@ from ..model.model import Model
 from ..model.quantities import ENERGY, single_quantity
 from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
+from ..results.events import CUMULATIVE_ENERGIES
 from ..results.linear_model import Descriptor, LinearModel, StateSpace
-from ..results.phases import CUMULATIVE_ENERGIES
 from ..results.result import Result
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..statics.stability import stability_by_eigenvalues

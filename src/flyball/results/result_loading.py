@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
+from .events import MotionStart
 from .files import (
     MOTION_ARRAYS,
     OWN_GROUP,
@@ -27,7 +28,6 @@ from .files import (
 from .files import unpack_events as events_unpack
 from .files import unpack_phases as stretches_unpack
 from .health import ContactHealth, Health, InitialDeviation
-from .phases import MotionStart
 from .result import Result
 
 ModelType = TypeVar("ModelType", bound=Model)

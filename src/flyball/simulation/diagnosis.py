@@ -22,7 +22,7 @@ from ..engine.loads import force_row
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..laws.bytecode import BY_TIME, evaluate, evaluate_jet
 from ..laws.python_functions import function_fault
-from ..mobility.contradictions import explain_contradiction
+from ..mobility.mobility import explain_contradiction
 from ..model.body import GROUND, Driver
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf, fields_with

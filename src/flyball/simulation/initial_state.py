@@ -23,8 +23,8 @@ from ..mobility.mobility import mobility
 from ..model.event import Set
 from ..model.model import Model
 from ..results.diagnostics import undetermined_event_forces, undetermined_loads
-from ..results.phases import MotionStart, energies_at_end
-from ..results.recorded_kinematics import extra_turns
+from ..results.events import MotionStart, energies_at_end
+from ..results.motion_record import extra_turns
 from ..results.result import Result
 from ..tables.constraint_rows import declared_switches
 from ..tables.coordinate_choice import least_cost, right_hand_side_cost, spanning_joints

@@ -20,15 +20,17 @@ from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import null_space
 from ..results.singularities import Branch, Singularities
 from .classification import BranchCurve, branches_through, classify
-from .closure_equations import CurvePoint, ReleasedMechanism, release_driver
 from .continuation import (
     SAME_POINT,
     STATIONARY_DRIVER,
     CurveNode,
+    CurvePoint,
     CurveTracer,
+    ReleasedMechanism,
     TracedCurve,
     locate_branch_point,
     rank_limit,
+    release_driver,
 )
 
 START_TOLERANCE = 1e-4  # a start nearer than this to a singular position is moved onto it [1]

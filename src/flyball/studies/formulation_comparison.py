@@ -25,7 +25,7 @@ from ..results.result import Result
 from ..simulation import initial_state
 from ..simulation.events.context import EventContext
 from ..simulation.events.event_loop import integrate_events
-from ..simulation.implicit.integrators import refuse_for_variational
+from ..simulation.implicit_integrators import refuse_for_variational
 from ..simulation.initial_state import InitialState, find_initial_state, start_time
 from ..simulation.integration_options import MOST_STEPS, Integration, output_times
 from ..simulation.law_faults import refuse_out_of_table

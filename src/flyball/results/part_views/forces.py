@@ -16,9 +16,9 @@ from ...laws.interval_evaluation import evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
-from ..event_driven_contacts import ContactHistory
-from ..phases import RecordedModes, stored_reference
-from ..recorded_kinematics import coordinate_records
+from ..contacts import ContactHistory
+from ..events import RecordedModes, stored_reference
+from ..motion_record import coordinate_records
 from .base import Curves, PartView
 
 

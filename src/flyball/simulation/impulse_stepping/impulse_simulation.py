@@ -23,11 +23,11 @@ from ...model.model import Model
 from ...numerics.complementarity.solver_choice import OTHER_SOLVED, PASSED_ON, SMALL_SOLVED
 from ...progress import ReportProgress
 from ...results import diagnostics
-from ...results.body_sets import BodySetMotion
 from ...results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
 from ...results.energy_balance import CONTACT_ELASTIC, EXCHANGE_SIGNS
 from ...results.health import ContactHealth, Health
 from ...results.motion_record import record_motion
+from ...results.part_views.bodies import BodySetMotion
 from ...results.result import Result
 from ...tables.contact_tables import ContactTables, contact_tables
 from ...tables.reference_configuration import BodyState

@@ -29,8 +29,8 @@ from ...model.geometry import matrix_to_quaternion
 from ...model.model import Model
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
+from ...results.events import cumulative_exchanges, energies_at_end
 from ...results.health import Health
-from ...results.phases import cumulative_exchanges, energies_at_end
 from ...results.result import Result
 from ...tables import table_definitions as su
 from ...tables.contact_places import rigid_stops

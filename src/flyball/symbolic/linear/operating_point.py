@@ -17,8 +17,7 @@ import numpy as np
 
 from ...assembly.compiled_mechanism import compile_mechanism
 from ...derivatives.force_balance import usual_states
-from ...derivatives.linear_reduction import product
-from ...derivatives.reduced_equations import gap_lengths, lost_constraints
+from ...derivatives.reduced_equations import gap_lengths, lost_constraints, product
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.graph import (
     ADD,

@@ -6,7 +6,7 @@ are differentiated by positions (along the velocities, so that quaternions have 
 controller states, accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions'
 directions, d(G^T lam)/dx, is in dr/dx.
 
-`derivatives/linear_reduction` has the equations of the elimination. Independent rows and coordinates are chosen by the
+`derivatives/reduced_equations` has the equations of the elimination. Independent rows and coordinates are chosen by the
 values of the parameters, with the pivoting of `Mechanism.linearize`; the basis consists of expressions.
 """
 
@@ -19,15 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.linear_reduction import (
+from ...derivatives.reduced_equations import (
     InputTerms,
     ReducedEquations,
     acting_terms,
     constrained_changes,
+    massless_motion_error,
+    pivot_rows,
     product,
     state_names,
 )
-from ...derivatives.reduced_equations import massless_motion_error, pivot_rows
 from ...engine.kinematics import quaternion_at
 from ...errors import ModelError
 from ...expression_graph.graph import (
