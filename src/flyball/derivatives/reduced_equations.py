@@ -40,8 +40,7 @@ from ..numerics.rank import (
 )
 from ..numerics.rank import sparse_matrix_rank as rank_of
 from ..tables.structure_definition import VelocityName, velocity_names
-from .equation_derivatives import EquationDerivatives, refuse_undetermined_friction
-from .force_balance import force_magnitudes, state_sizes
+from .equation_derivatives import EquationDerivatives, force_magnitudes, refuse_undetermined_friction, state_sizes
 
 # Dependence of an output on an input's rate below this part of its total dependence on the input is rounding.
 IMPROPER_TOLERANCE = 1e-12

@@ -15,8 +15,7 @@ import numpy as np
 from ..analysis_options import Options
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import state_sizes
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, state_sizes
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.reduced_equations import (

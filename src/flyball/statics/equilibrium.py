@@ -17,8 +17,7 @@ from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import StateSizes, state_sizes
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, StateSizes, state_sizes
 from ..derivatives.output_derivatives import snapshot
 from ..derivatives.reduced_equations import free_coordinates
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError

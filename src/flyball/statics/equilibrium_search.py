@@ -19,8 +19,9 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.positions_and_velocities import row_scales
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import (
+from ..derivatives.equation_derivatives import (
+    EquationDerivatives,
+    MechanismState,
     force_magnitudes,
     is_balanced,
     is_balanced_beyond_rounding,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...assembly.compiled_mechanism import compile_mechanism
-from ...derivatives.force_balance import usual_states
+from ...derivatives.equation_derivatives import usual_states
 from ...derivatives.reduced_equations import gap_lengths, lost_constraints, product
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.graph import (
