@@ -392,14 +392,7 @@ def compile_law(
     if not inputs or inputs[0] != "t" or len(const) < len(parameters):
         raise ValueError("the first input is 't', and const starts with one value for each parameter")
     _refuse_ambiguous_names(expression, inputs, parameters, sensors)
-    known = [*inputs, *sensors, *parameters]
-    expression.require(known)
-    expression.require_tables(tables)
-    if derivatives:
-        expression.require_derivatives()
-    tree = expression.tree
-    if expression.function is not None:
-        tree = call_node(tree, known, expression.text, expression.where)
+    tree = _required_tree(expression, [*inputs, *sensors, *parameters], tables, derivatives)
     tree = _with_code(tree, code, functions)
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
     tree = _folded(expression, tree, writer.varying)
@@ -409,6 +402,17 @@ def compile_law(
         tree = on_one_side(tree, frozenset((*inputs[1:], *sensors)), corners)
     writer.write(tree)
     return writer.append(code)
+
+
+def _required_tree(expression: Expression, known: Sequence[str], tables: Mapping[str, int], derivatives: bool) -> Any:
+    """Tree of a law whose names, tables and derivatives exist; a Python function is a call with all names."""
+    expression.require(known)
+    expression.require_tables(tables)
+    if derivatives:
+        expression.require_derivatives()
+    if expression.function is None:
+        return expression.tree
+    return call_node(expression.tree, known, expression.text, expression.where)
 
 
 def compile_decision(
