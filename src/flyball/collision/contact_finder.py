@@ -24,7 +24,7 @@ from .tables import (
     SIZE_LEVELS,
     Bounds,
     ContactCounts,
-    Contacts,
+    ContactTable,
     Envelopes,
     Geometry,
     LevelCells,
@@ -240,7 +240,7 @@ class ContactFinder:
         self.search.count.narrow_phase = narrow_phase_kernel(geometry).address
         self.address = search.address
 
-    def find(self, movers: Movers, rebuild: bool = False) -> Contacts:
+    def find(self, movers: Movers, rebuild: bool = False) -> ContactTable:
         """Find the contacts at these poses; writes them to ``now``, and the old ``now`` becomes ``before``.
 
         Parameters
@@ -320,7 +320,7 @@ class ContactFinder:
         return int(B.slot.shape_index[many.argmax()]), int(many.max())
 
 
-def _enlarged_contacts(C: Contacts, capacity: int) -> Contacts:
+def _enlarged_contacts(C: ContactTable, capacity: int) -> ContactTable:
     """Copy contacts to a larger table."""
     out = no_contacts(capacity)
     n = min(len(C.at), capacity)

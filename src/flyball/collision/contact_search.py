@@ -42,7 +42,7 @@ from .tables import (
     NOT_FINITE,
     SPHERE_PLANE,
     SPHERE_SPHERE,
-    Contacts,
+    ContactTable,
     Geometry,
     Movers,
     Search,
@@ -501,7 +501,7 @@ def find_contacts(G, M, C, O, B, task):
 
 
 @kernel
-def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
+def search(G: Geometry, M: Movers, C: ContactTable, O: ContactTable, B: Search, task: int) -> int:
     """Find contacts at the movers' poses. Returns a status (DONE, FULL_*, NOT_FINITE), also in ``C.count.status``."""
     C.count.status = find_contacts(G, M, C, O, B, task)
     C.count.rebuilt = B.count.rebuilds

@@ -107,7 +107,7 @@ class ContactPoints(Record, kind="Float", rows=True):
     half_separation: Vector3  # half the distance of that point on the two shapes until they touch (subtracted on 1)
 
 
-class Contacts(NamedTuple):
+class ContactTable(NamedTuple):
     """Contacts at one time. Two of these are used alternately, to match contacts with those of the last search."""
 
     count: ContactCounts  # type: ignore[assignment]
@@ -115,9 +115,9 @@ class Contacts(NamedTuple):
     x: ContactPoints
 
 
-def no_contacts(capacity: int) -> Contacts:
+def no_contacts(capacity: int) -> ContactTable:
     """Create an empty table of contacts."""
-    C = Contacts(ContactCounts.blank(), ContactShapes.blank(capacity), ContactPoints.blank(capacity))
+    C = ContactTable(ContactCounts.blank(), ContactShapes.blank(capacity), ContactPoints.blank(capacity))
     C.at[:] = -1
     return C
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
@@ -42,7 +42,7 @@ Times = int | Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class KinematicsOptions(Options):
+class KinematicsOptions(AnalysisOptions):
     """Arguments of `Mechanism.kinematics`."""
 
     times: Times

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.entry_point import MOTION
@@ -383,7 +383,7 @@ class Prepared(RecursiveMethods):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrepareOptions(Options):
+class PrepareOptions(AnalysisOptions):
     """Arguments of `Mechanism.prepare`."""
 
     coordinates: str

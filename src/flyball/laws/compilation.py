@@ -394,7 +394,7 @@ def compile_law(
     _refuse_ambiguous_names(expression, inputs, parameters, sensors)
     tree = _required_tree(expression, [*inputs, *sensors, *parameters], tables, derivatives)
     tree = _with_code(tree, code, functions)
-    writer = _Writer(expression, inputs, parameters, const, sensors, tables)
+    writer = _ProgramWriter(expression, inputs, parameters, const, sensors, tables)
     tree = _folded(expression, tree, writer.varying)
     if derivatives:
         tree = _single_powers(tree, writer.varying)
@@ -425,7 +425,7 @@ def compile_decision(
     tables: Mapping[str, int],
 ) -> tuple[int, int]:
     """Append the program of a corner's deciding expression, of time and sensors, as `compile_law` does."""
-    writer = _Writer(law, ("t",), parameters, const, sensors, tables)
+    writer = _ProgramWriter(law, ("t",), parameters, const, sensors, tables)
     writer.write(tree)
     return writer.append(code)
 
@@ -536,7 +536,7 @@ def _function(request: FunctionCall, code: list[int], functions: list[CalledFunc
     return len(code) - 3
 
 
-class _Writer:
+class _ProgramWriter:
     """Writer of the program of one law."""
 
     def __init__(

@@ -80,7 +80,7 @@ class Step(NamedTuple):
     logical: bool = False
 
 
-class Corner(NamedTuple):
+class CornerLevels(NamedTuple):
     """Corner: step ``at`` has a corner or jumps where step ``of`` reaches one of ``levels`` (repeated with ``period``).
 
     ``touched``: also where the argument only touches the level.
@@ -253,7 +253,7 @@ def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
     return sorted(found)
 
 
-def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
+def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[CornerLevels]:
     """Find where steps of time alone may have corners, jumps, or ends of their domain; inner ones first."""
     out = []
     zero = np.zeros(1)
@@ -261,21 +261,21 @@ def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
         if s.on != TIME_ONLY:
             continue
         if s.operation == CALL and s.operand in (SIGN, ABS, LOG):
-            out.append(Corner(k, s.args[0], zero))
+            out.append(CornerLevels(k, s.args[0], zero))
         elif (s.operation == CALL and s.operand == SQRT) or s.operation == POWER:
-            out.append(Corner(k, s.args[0], zero, touched=True))
+            out.append(CornerLevels(k, s.args[0], zero, touched=True))
         elif s.operation == CALL and s.operand in (ASIN, ACOS):
-            out.append(Corner(k, s.args[0], np.array([-1.0, 1.0]), touched=True))
+            out.append(CornerLevels(k, s.args[0], np.array([-1.0, 1.0]), touched=True))
         elif s.operation == CALL and s.operand == TAN:
-            out.append(Corner(k, s.args[0], np.array([0.5 * np.pi]), np.pi))
+            out.append(CornerLevels(k, s.args[0], np.array([0.5 * np.pi]), np.pi))
         elif s.operation in (DIVIDE, ATAN2) and steps[s.args[s.operation == DIVIDE]].on == TIME_ONLY:
-            out.append(Corner(k, s.args[s.operation == DIVIDE], zero))
+            out.append(CornerLevels(k, s.args[s.operation == DIVIDE], zero))
         elif s.operation == WHOLE_POWER and s.operand < 0:
-            out.append(Corner(k, s.args[0], zero))
+            out.append(CornerLevels(k, s.args[0], zero))
         elif s.operation == TABLE and len(levels := table_corners(const, s.operand)):
-            out.append(Corner(k, s.args[0], levels, float(const[s.operand])))
+            out.append(CornerLevels(k, s.args[0], levels, float(const[s.operand])))
         elif len(s.args) == 3 and s.operation not in (WHERE, BLEND):
-            out.append(Corner(k, s.args[2], zero))
+            out.append(CornerLevels(k, s.args[2], zero))
     return out
 
 

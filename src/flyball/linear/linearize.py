@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, state_sizes
@@ -39,7 +39,7 @@ from ..model.quantities import ENERGY, single_quantity
 from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
 from ..results.events import CUMULATIVE_ENERGIES
-from ..results.linear_model import Descriptor, LinearModel, StateSpace
+from ..results.linear_model import Descriptor, LinearModel, StateSpaceForm
 from ..results.result import Result
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..statics.stability import stability_by_eigenvalues
@@ -62,7 +62,7 @@ FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts 
 
 
 @dataclass(frozen=True, kw_only=True)
-class OperatingPointOptions(Options):
+class OperatingPointOptions(AnalysisOptions):
     """Options for the operating point of an analysis of small motions."""
 
     about: Result | Equilibrium | None
@@ -189,7 +189,7 @@ def _reduced_linear_model(x: MechanismState, o: LinearizeOptions, named: list[In
     return _linear_model(e, named, o.outputs, space, partial(dense_descriptor, e, f, frame, named, o.outputs), frame)
 
 
-def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpace:
+def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpaceForm:
     """Dense state space of a large mechanism, computed only when needed."""
     x, named = _with_inputs(o.state(model), o.inputs)
     return _reduced_linear_model(x, o, named).dense
@@ -313,10 +313,10 @@ def _eigenvalues(A: np.ndarray, uncertainty: MatrixUncertainty | None) -> np.nda
 
 def _state_space(
     e: EquationDerivatives, f: FreeCoordinates, r: ReducedEquations, inputs: list[Input], outputs: Sequence[str]
-) -> StateSpace:
+) -> StateSpaceForm:
     A, B, C, D = _matrices(r, _output_matrix(e, r, inputs, outputs), inputs, outputs)
     states, units = state_names(f.names, f, [x.name for x in e.state.c.structure.controls])
-    return StateSpace(
+    return StateSpaceForm(
         A=A,
         B=B,
         C=C,
@@ -335,7 +335,7 @@ def _linear_model(
     e: EquationDerivatives,
     inputs: list[Input],
     outputs: Sequence[str],
-    dense: StateSpace | Callable[[], StateSpace],
+    dense: StateSpaceForm | Callable[[], StateSpaceForm],
     sparse: Descriptor | Callable[[], Descriptor],
     frame: TurningFrame | None,
     period: float | None = None,

@@ -369,7 +369,7 @@ def _disagreement(
 MAX_NAMED_MOTIONS = 64  # free motions of a large mechanism that are named; all are counted
 
 
-class MobilityDetails(ConstraintNullSpaces):
+class MobilityAnalysis(ConstraintNullSpaces):
     """Data of a count, from which further results are computed on access."""
 
     @property
@@ -451,7 +451,7 @@ def mobility(
         if (name := s.rows[k].element.name) not in names:
             names.append(name)
     lam = dependent / np.maximum(size, 1e-300)[:, None]
-    there = MobilityDetails(a, lam, None if motions is None else motions * scale[:, None], gap)
+    there = MobilityAnalysis(a, lam, None if motions is None else motions * scale[:, None], gap)
     without = ignored_elements(model)
     loose = undetermined_components(a, lam, names) if len(names) else {}
     return Mobility(nv, nr, rank, tuple(names), loose, without, there, lam.shape[1])

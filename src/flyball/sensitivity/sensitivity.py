@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options, require_positive
+from ..analysis_options import AnalysisOptions, require_positive
 from ..assembly.assemble import assemble
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..derivatives.eigenvalues import EQUAL_TOLERANCE, MAX_SPLITTING, equal_groups, invariant_subspace
@@ -261,7 +261,7 @@ MOTION_DEFAULTS = {"outputs": 51, "rtol": 1e-9, "atol": 1e-11}  # defaults of a 
 
 
 @dataclass(frozen=True, kw_only=True)
-class DerivativeOptions(Options):
+class DerivativeOptions(AnalysisOptions):
     """Options of derivatives: quantities, parameters, and the analysis that relates them."""
 
     analysis: str

@@ -23,7 +23,7 @@ Dependence = tuple[np.ndarray, np.ndarray]
 states of controllers. Equations have the same numbers; those of the states are followed by rates of the rows."""
 
 
-class Terms(NamedTuple):
+class TermDerivatives(NamedTuple):
     """A sparse matrix of derivatives, assembled as sums of finite differences (complex steps)."""
 
     i: np.ndarray  # equations and velocities of its entries
@@ -108,7 +108,7 @@ class DependencePattern:
             out += [(self.entries[n], depends) for n in lines]
         return out
 
-    def terms(self, some: Sequence[Dependence], first: np.ndarray) -> Terms:
+    def terms(self, some: Sequence[Dependence], first: np.ndarray) -> TermDerivatives:
         """Return the derivatives of the sums of some terms, whose entries begin at ``first``."""
         group = self._groups([depends for _, depends in some])
         none = np.zeros(0, np.int64)
@@ -119,7 +119,7 @@ class DependencePattern:
         n = max(self.nv + self.nx, 1)
         keys, entry = np.unique(i * n + j, return_inverse=True)
         pick = np.column_stack([entry, group[j], at])
-        return Terms(keys // n, keys % n, pick.astype(np.int64), group)
+        return TermDerivatives(keys // n, keys % n, pick.astype(np.int64), group)
 
     def _groups(self, together: Sequence[np.ndarray]) -> np.ndarray:
         """Return a number for each variable, equal for variables that no term depends on together, (nv + nx,)."""

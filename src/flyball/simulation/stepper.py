@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..analysis_options import Options, require_count, require_positive, seconds
+from ..analysis_options import AnalysisOptions, require_count, require_positive, seconds
 from ..engine.entry_point import INTEGRATE
 from ..errors import FlyballError, ModelError, SimulationError
 from ..laws.breakpoints import NO_BREAKPOINTS
@@ -166,7 +166,7 @@ def input_places(model: Model, inputs: Sequence[str]) -> np.ndarray:
     return np.array([names.index(name) for name in inputs], np.int64)
 
 
-class FreeCoordinates(NamedTuple):
+class FreeBodyPlaces(NamedTuple):
     """Places of free bodies' coordinates; entries of a table (n, width) are numbered row by row."""
 
     q: np.ndarray  # (n, k) entries of the state
@@ -176,7 +176,7 @@ class FreeCoordinates(NamedTuple):
     mover: np.ndarray  # (n,)
 
 
-class ImpulseMotion:
+class AbsoluteImpulseMotion:
     """A motion by impulse time stepping, in absolute coordinates.
 
     Parameters
@@ -207,10 +207,10 @@ class ImpulseMotion:
         q, v, k = tree.q[bodies, None], self.structure.nq + tree.v[bodies, None], movers[:, None]
         width = self.stepper.workspaces.X.v.shape[1]
         i = np.arange(n)
-        self._shifting = FreeCoordinates(q + i, v + i, POSE_WIDTH * k + i, width * k + i, movers)
+        self._shifting = FreeBodyPlaces(q + i, v + i, POSE_WIDTH * k + i, width * k + i, movers)
         i, j = (np.arange(1), np.array([5])) if model.planar else (np.arange(4), np.arange(3, 6))
-        turns = FreeCoordinates(q + np.arange(n, nq), v + np.arange(n, nv), len(i) * k + i, width * k + j, movers)
-        self._turning = FreeCoordinates(*(x[tree.nv[bodies] > n] for x in turns))
+        turns = FreeBodyPlaces(q + np.arange(n, nq), v + np.arange(n, nv), len(i) * k + i, width * k + j, movers)
+        self._turning = FreeBodyPlaces(*(x[tree.nv[bodies] > n] for x in turns))
         self._sign = np.ones((0, 1))
         if not model.planar:  # a quaternion and its negative are the same rotation
             same = (self.stepper.free.turn.take(self._turning.source) * base.q[self._turning.q]).sum(axis=1)
@@ -291,7 +291,7 @@ MOST_STEPS = 100_000  # integration steps within one step of the stepper
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepperOptions(Options):
+class StepperOptions(AnalysisOptions):
     """Arguments of `Mechanism.stepper`."""
 
     dt: float
@@ -386,7 +386,7 @@ class Stepper:
         count = o.copies or 1
         self._described = [self._begin(self._model, {}) for _ in range(count)]
         first = self._described[0].motion
-        if isinstance(first, ImpulseMotion):
+        if isinstance(first, AbsoluteImpulseMotion):
             self.method += f"; steps of {first.chosen.text}"
         self._copies = list(self._described)
         self._inputs = np.tile(self._usual, (count, 1))
@@ -401,7 +401,7 @@ class Stepper:
         motion: StepMotion
         if self.method.startswith(IMPULSE_STEPPING):
             stepping = o.method if isinstance(o.method, Stepping) else Stepping()
-            motion = ImpulseMotion(model, o.t_start, stepping, parameters, self._parameters)
+            motion = AbsoluteImpulseMotion(model, o.t_start, stepping, parameters, self._parameters)
         else:
             start = find_initial_state(model, o.t_start, parameters, None, o.coordinates)
             motion = IntegratedMotion(start, o.integration(), self.dt, self._parameters)

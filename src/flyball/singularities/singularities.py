@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis_options import Options, require_positive
+from ..analysis_options import AnalysisOptions, require_positive
 from ..analysis_options import require_count as at_least
 from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
@@ -38,7 +38,7 @@ RANGE_TOLERANCE = 1e-9  # distance beyond the ends of the range allowed for a si
 
 
 @dataclass(frozen=True, kw_only=True)
-class SingularitiesOptions(Options):
+class SingularitiesOptions(AnalysisOptions):
     """Arguments of `Mechanism.singularities`."""
 
     driver: str

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
@@ -192,7 +192,7 @@ LINEARIZE_DEFAULTS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class EquilibriumOptions(Options):
+class EquilibriumOptions(AnalysisOptions):
     """Arguments of `Mechanism.equilibrium`."""
 
     t: float

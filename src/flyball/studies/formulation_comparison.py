@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis_options import Options, require_count, seconds
+from ..analysis_options import AnalysisOptions, require_count, seconds
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..engine.entry_point import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
@@ -105,7 +105,7 @@ FORMULATIONS = EXPLICIT_FORMULATIONS | IMPLICIT_FORMULATIONS
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareOptions(Options):
+class CompareOptions(AnalysisOptions):
     """Arguments of `Mechanism.compare`."""
 
     t_end: float

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..errors import ModelError
 from ..expression_graph.graph import Symbol
 from ..model.body import Body
@@ -185,7 +185,7 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportOptions(Options):
+class ExportOptions(AnalysisOptions):
     """Arguments of `Mechanism.export`."""
 
     folder: str | Path | None

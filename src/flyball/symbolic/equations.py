@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assembled_state import Assembly
 from ..errors import AnalysisError, ModelError
 from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, expanded_symbol_count, object_vector
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SymbolicOptions(Options):
+class SymbolicOptions(AnalysisOptions):
     """Arguments of `Mechanism.symbolic`."""
 
     coordinates: str

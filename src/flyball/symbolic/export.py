@@ -68,7 +68,7 @@ SinglePass = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass
-class Solution:
+class SolvedAccelerations:
     """Solution of the equations of motion at a state that fulfils g = 0 and G v = nu."""
 
     vdot: np.ndarray  # (nv,)
@@ -76,7 +76,7 @@ class Solution:
     loads: np.ndarray  # (nl,), of joints with friction
 
 
-def solve_traced(x: TracedEquations) -> Solution:
+def solve_traced(x: TracedEquations) -> SolvedAccelerations:
     """Solve the traced equations.
 
     Parameters
@@ -91,7 +91,7 @@ def solve_traced(x: TracedEquations) -> Solution:
     """
     once = coupled(x) if len(x.system.mass_entries.row) else schur(x)
     if not x.loads:
-        return Solution(*_refined(x, once, x.f, x.gamma), zero_objects(0))
+        return SolvedAccelerations(*_refined(x, once, x.f, x.gamma), zero_objects(0))
     return _loaded(x, once)
 
 
@@ -221,7 +221,7 @@ def solve_factored(P: LDLPattern, L: np.ndarray, D: np.ndarray, b: np.ndarray) -
     return z[P.perm]
 
 
-def _loaded(x: TracedEquations, once: SinglePass) -> Solution:
+def _loaded(x: TracedEquations, once: SinglePass) -> SolvedAccelerations:
     """Solution where friction depends on the reactions, and these on friction.
 
     Multipliers are linear functions of the loads, lam = lam0 + K load; each load is a norm of some of them.
@@ -240,7 +240,7 @@ def _loaded(x: TracedEquations, once: SinglePass) -> Solution:
         back = object_vector(substitute(list(x.returned), at))
         slope = object_vector(substitute(list(by_lam.ravel()), at)).reshape(by_lam.shape) @ K
         loads = loads + eliminate(np.eye(len(loads)) - slope, back - loads)
-    return Solution(vdot + A @ loads, lam + K @ loads, loads)
+    return SolvedAccelerations(vdot + A @ loads, lam + K @ loads, loads)
 
 
 def eliminate(A: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -319,7 +319,7 @@ class Functions:
         return [a for k, a in self.arguments.items() if k in usual or any(x.index in met for x in a.nodes)]
 
     @cached_property
-    def solution(self) -> Solution:
+    def solution(self) -> SolvedAccelerations:
         """Accelerations, multipliers and loads."""
         return solve_traced(self.traced)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import AT_REST, NO_IMPULSE, UNILATERAL
-from .stop import Stop
+from .stop import RigidStop
 from .switch_kind import (
     G_BACK,
     G_LOWER,
@@ -50,7 +50,7 @@ class OneWayLatch(SwitchKind):
         return 1.0
 
 
-class RatchetLatch(Stop):
+class RatchetLatch(RigidStop):
     """A stop at the last tooth passed: its lower bound is removed while it moves forwards."""
 
     def initial_numbers(self, named: dict[str, Any]) -> dict[str, Any]:

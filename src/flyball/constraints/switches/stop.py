@@ -10,7 +10,7 @@ from ...numerics.complementarity.dense_problem import AT_REST, BILATERAL, NO_IMP
 from .switch_kind import G_LOWER, G_PULL, G_UPPER, OFF, ONE_SIDED, Instant, ProblemRow, SwitchKind
 
 
-class Stop(SwitchKind):
+class RigidStop(SwitchKind):
     """A row that is active at a bound while it pushes; impacts rebound by the coefficient of restitution."""
 
     def velocity_rows(self, n: Instant, s: int, at: tuple[float, ...], still: bool) -> list[ProblemRow]:
@@ -49,7 +49,7 @@ def bound_rows(s: int, at: tuple[float, ...], state: int = AT_REST) -> list[Prob
     return [ProblemRow(s, BILATERAL)] if len(at) > 1 else [ProblemRow(s, UNILATERAL, at[0], state=state)]
 
 
-STOP = Stop(
+STOP = RigidStop(
     guards=(G_LOWER, G_UPPER, G_PULL), forces=ONE_SIDED, bounded=True, role="is closed",
     closing=("close", "closes"), opening=("open", "opens"), states=("closed", "open"),
 )  # fmt: skip

@@ -27,7 +27,7 @@ from .contact_problem import (
     STALLED,
     STORAGE_TOO_SMALL,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -256,7 +256,7 @@ class IslandSolver(NamedTuple):
     numbers: Float1
     places: Int1
     P: ContactProblem
-    X: ContactState
+    X: ContactSolution
     islands: Islands
     pick: Int1  # (ni,): islands, small ones first
     doors: Int1
@@ -453,7 +453,7 @@ def solve_all_islands(P, X, W, O, F):
         solve_islands(
             P,
             X,
-            by_address(ContactState(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])),
+            by_address(ContactSolution(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])),
             W,
             O,
             F,
@@ -465,7 +465,9 @@ def solve_all_islands(P, X, W, O, F):
 
 
 @kernel
-def auto(P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: IslandSolver, task: int) -> int:
+def auto(
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: IslandSolver, task: int
+) -> int:
     """Solve every island by the solver chosen for it; returns the most iterations of any. F is an `IslandSolver`."""
     return solve_all_islands(P, X, W, O, F)
 
@@ -508,7 +510,7 @@ def solver_names() -> tuple[str, ...]:
 
 
 def prepare_solver(
-    name: str, P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings
+    name: str, P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings
 ) -> PreparedSolver:
     """Prepare a solver for problems of these capacities; compiles what it needs.
 

@@ -300,7 +300,7 @@ MOST_STEPS_PER_CALL, CALL_SECONDS = (
 )  # steps between two progress reports, and their largest duration
 
 
-class ImpulseMotion(NamedTuple):
+class ImpulseStart(NamedTuple):
     """A motion by impulse time stepping at its start."""
 
     base: Assembly
@@ -312,7 +312,7 @@ class ImpulseMotion(NamedTuple):
 
 def begin_by_impulses(
     model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, before: Result | None = None
-) -> ImpulseMotion:
+) -> ImpulseStart:
     """Return the motion of a model at time t, as described or at the end of an earlier result.
 
     Raises
@@ -335,7 +335,7 @@ def begin_by_impulses(
         place_body_sets(scene, at, before)
     chosen = choose_step(o, scene, at, values, held.start if held else None, before.health if before else None)
     try:
-        return ImpulseMotion(base, scene, make_stepper(scene, at, values, o, chosen, held), held, chosen)
+        return ImpulseStart(base, scene, make_stepper(scene, at, values, o, chosen, held), held, chosen)
     except NoSolution:
         raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
 

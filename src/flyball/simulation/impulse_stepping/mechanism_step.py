@@ -11,7 +11,7 @@ numerical.
 
 from __future__ import annotations
 
-from ...collision.tables import Contacts, Movers
+from ...collision.tables import ContactTable, Movers
 from ...compiler.formulas import call, formula
 from ...compiler.kernels import kernel
 from ...engine.calls import ARRIVE, MOTION, POSITION, SOLVE
@@ -19,7 +19,7 @@ from ...engine.kinematics import retract
 from ...engine.rows import row_times
 from ...math.scalar import sqrt
 from ...math.vec import dot, load3, load9, mtv, mv, store3, store9
-from ...numerics.complementarity.contact_problem import ContactProblem, ContactState
+from ...numerics.complementarity.contact_problem import ContactProblem, ContactSolution
 from ...tables.table_definitions import SCHUR
 from .mechanism_rows import (
     account_lines,
@@ -538,7 +538,9 @@ def finish_step(A, M, X):
 
 
 @kernel
-def mechanism_kernel(A: MechanismTables, M: Movers, C: Contacts, P: ContactProblem, X: ContactState, task: int) -> int:
+def mechanism_kernel(
+    A: MechanismTables, M: Movers, C: ContactTable, P: ContactProblem, X: ContactSolution, task: int
+) -> int:
     """Run a task of the jointed mechanism ``A`` with movers, contacts, problem and state of the step.
 
     Tasks: see `stepping_tables`. Returns 0, TABLES_FULL, or the engine's status.

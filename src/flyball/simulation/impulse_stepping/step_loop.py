@@ -15,7 +15,7 @@ from ...collision.contact_search import STEP as STEP_ON
 from ...collision.tables import (
     DONE,
     FULL_CONTACTS,
-    Contacts,
+    ContactTable,
     Geometry,
     Movers,
     Search,
@@ -27,7 +27,7 @@ from ...numerics.complementarity.contact_operator import apply_contact_impulse, 
 from ...numerics.complementarity.contact_problem import (
     CONVERGED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     SolverSettings,
 )
@@ -84,10 +84,10 @@ from .stepping_tables import (
     TASK_MEAN_VELOCITIES,
     TASK_POSES,
     TASK_ROWS,
-    ContactHistory,
     FreeBodies,
     MechanismTables,
-    RunState,
+    SteppingState,
+    StoredContacts,
 )
 from .stepping_tables import TASK_FINAL_VELOCITIES as VELOCITIES_AFTER
 
@@ -103,10 +103,10 @@ class StepSolvers(NamedTuple):
 def bind_solvers(
     name: str,
     problems: tuple[ContactProblem, ContactProblem, ContactProblem],
-    X: ContactState,
+    X: ContactSolution,
     W: ContactWorkspace,
     O: SolverSettings,
-    state: RunState,
+    state: SteppingState,
 ) -> StepSolvers:
     """Bind a solver for velocities, positions and impacts; its addresses are stored in ``state.addresses``."""
     found = [prepare_solver(name, P, X, W, O) for P in problems]
@@ -520,25 +520,25 @@ def step_loop_kernel(
     G: Geometry,
     A: MechanismTables,
     M: Movers,
-    C: Contacts,
-    D: Contacts,
-    H: Contacts,
+    C: ContactTable,
+    D: ContactTable,
+    H: ContactTable,
     B: Search,
     P: ContactProblem,
     Q: ContactProblem,
     R: ContactProblem,
-    X: ContactState,
-    Y: ContactState,
-    Z: ContactState,
-    E: ContactState,
+    X: ContactSolution,
+    Y: ContactSolution,
+    Z: ContactSolution,
+    E: ContactSolution,
     W: ContactWorkspace,
     O: SolverSettings,
     F: StepSolvers,
     N: FreeBodies,
     L: Surfaces,
-    state: RunState,
-    T: ContactHistory,
-    U: ContactHistory,
+    state: SteppingState,
+    T: StoredContacts,
+    U: StoredContacts,
 ) -> int:
     """Take ``state.counts.steps_left`` steps. Returns a status: of the contact search, TABLES_FULL, NO_SOLUTION or
     STEP_TOO_LONG.

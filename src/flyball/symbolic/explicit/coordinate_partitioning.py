@@ -410,7 +410,7 @@ NO_EXTRA_SYMBOLS = ExtraSymbols()
 
 
 @dataclass(repr=False)
-class ReducedEquations:
+class IndependentEquations:
     """Equations of motion in independent coordinates; see `reduce_equations`.
 
     Attributes
@@ -470,7 +470,7 @@ def reduce_equations(
     start: Mapping[str, float],
     independent: Sequence[str] = (),
     more: ExtraSymbols = NO_EXTRA_SYMBOLS,
-) -> ReducedEquations:
+) -> IndependentEquations:
     """Solve a mechanism's equations for the accelerations of independent coordinates.
 
     Parameters
@@ -567,7 +567,7 @@ class _Reduction:
 
     def equations(
         self, known: list[int], chosen: list[int], rows: list[int], solved: SolvedPositions
-    ) -> ReducedEquations:
+    ) -> IndependentEquations:
         x, nv = self.x, len(self.names)
         for name, value in solved.never:
             self.singular[f"positions of {name}"] = value
@@ -597,7 +597,7 @@ class _Reduction:
         lam = solve_blocks(Gw.T, missing[:, None], dets, transposed_blocks(order or []))[:, 0]
         definitions += self._multipliers(rows, lam)
         definitions += self._each(self.more.vdot, vdot, "accelerations") if self.more.vdot else []
-        return ReducedEquations(
+        return IndependentEquations(
             x, self.place, self.place.values, self.names, known, chosen, dependent, solved.definitions, definitions, M,
             f, Z, vdot, self._all(rows, lam), self.singular, self._undetermined(), solved.notes,
         )  # fmt: skip

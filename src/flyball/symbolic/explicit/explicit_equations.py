@@ -35,7 +35,7 @@ from ...model.model import suggest
 from ...numerics.rank import fundamental_subspaces
 from ..expressions import TOO_LONG, Expressions, formula_lines, node_count
 from ..named_equations import curve_parameters_at
-from .coordinate_partitioning import ExtraSymbols, ReducedEquations, reduce_equations
+from .coordinate_partitioning import ExtraSymbols, IndependentEquations, reduce_equations
 from .definitions import Definition, ImplicitSolver, implicit_rates
 from .linear_systems import Determinants
 
@@ -172,7 +172,7 @@ class ExplicitEquations:
         Dependent coordinate -> form of its equation, and the branch.
     """
 
-    def __init__(self, equations: Equations, solution: ReducedEquations, inputs: dict[str, Node]) -> None:
+    def __init__(self, equations: Equations, solution: IndependentEquations, inputs: dict[str, Node]) -> None:
         self.equations, self.solution, self.inputs = equations, solution, inputs
         self.independent = solution.independent
         formulas = [d for d in solution.positions if d.closed]
