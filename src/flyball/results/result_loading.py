@@ -51,7 +51,7 @@ def read_result(path: str | os.PathLike, cls: type[ModelType]) -> Result:
         result = _rebuild_result(stored, cls, where)
     except ModelError:
         raise
-    except Exception as error:  # for any content of the file
+    except Exception as error:  # the file may hold anything, and names the user's classes
         raise _damaged_file_error(where, f"{type(error).__name__}: {error}") from None
     if kind < 3:
         late: dict[str, Any] = result.health.late

@@ -222,7 +222,7 @@ def finite(s: Subject) -> str:
     for state in s.states:
         try:
             found = state.function(*state.arguments)
-        except Exception as error:
+        except Exception as error:  # a user's formula may raise anything
             return f"{state.signature} raises {type(error).__name__}: {error}"
         lengths = _lengths(found)
         if lengths != state.signature.result:
