@@ -26,31 +26,7 @@ from typing import Any
 from ..errors import ExpressionError
 from ..model.expression_parser import DEFINED, DEFINITIONS, FunctionCall, SyntaxNode, call_node
 from ..model.expressions import Expression, fold_constants
-from .bytecode import (
-    ADD,
-    ATAN2,
-    BLEND,
-    CALL,
-    CONSTANT,
-    COPY,
-    DIVIDE,
-    FREEZE,
-    FUNCTION,
-    INPUT,
-    KEEP,
-    LESS,
-    LESS_EQUAL,
-    MAXIMUM,
-    MINIMUM,
-    MULTIPLY,
-    NEGATE,
-    POWER,
-    SENSOR,
-    SUBTRACT,
-    TABLE,
-    WHERE,
-    WHOLE_POWER,
-)
+from . import bytecode
 from .python_functions import CalledFunction, compile_function
 
 SIDE, BETWEEN_SIDES = "side", "between sides"
@@ -332,10 +308,24 @@ def _new_node(like: SyntaxNode, kind: str, *args: SyntaxNode, value: float | Non
 
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
-_UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
+_UNARY = {name: bytecode.NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
 _BINARY = {
-    **{"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "**": POWER, "atan2": ATAN2},
-    **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
+    **{
+        "+": bytecode.ADD,
+        "-": bytecode.SUBTRACT,
+        "*": bytecode.MULTIPLY,
+        "/": bytecode.DIVIDE,
+        "**": bytecode.POWER,
+        "atan2": bytecode.ATAN2,
+    },
+    **{
+        "min": bytecode.MINIMUM,
+        "max": bytecode.MAXIMUM,
+        "<": bytecode.LESS,
+        "<=": bytecode.LESS_EQUAL,
+        "and": bytecode.MINIMUM,
+        "or": bytecode.MAXIMUM,
+    },
 }
 SEARCHED_CONSTANTS = 64  # constants among which a literal is searched
 _NONE: Mapping[str, int] = MappingProxyType({})
@@ -549,8 +539,8 @@ class _ProgramWriter:
         tables: Mapping[str, int],
     ) -> None:
         self.expression = expression
-        self.varying = {name: (INPUT, k) for k, name in enumerate(inputs)}
-        self.varying |= {name: (SENSOR, k) for name, k in sensors.items()}
+        self.varying = {name: (bytecode.INPUT, k) for k, name in enumerate(inputs)}
+        self.varying |= {name: (bytecode.SENSOR, k) for name, k in sensors.items()}
         self.parameters = {name: k for k, name in enumerate(parameters)}
         self.const = const
         self.tables = tables
@@ -567,21 +557,21 @@ class _ProgramWriter:
         """Write a node after its arguments; `frozen`: a constant part around it is already marked."""
         constant = frozen or _constant(node, self.varying)
         if node.kind == "number":
-            return self.emit(CONSTANT, self.slot(float(node.value)), 1)
+            return self.emit(bytecode.CONSTANT, self.slot(float(node.value)), 1)
         if node.kind == SIDE:
-            return self.emit(SENSOR, node.value, 1)
+            return self.emit(bytecode.SENSOR, node.value, 1)
         if node.kind == DEFINITIONS:
             return self.write_definitions(node)
         if node.kind == DEFINED:
-            return self.emit(COPY, self.defined[node.value], 1)
+            return self.emit(bytecode.COPY, self.defined[node.value], 1)
         if node.kind == "name" and node.value in self.varying:
             return self.emit(*self.varying[node.value], 1)
         if node.kind == "name":
-            return self.emit(CONSTANT, self.parameters[node.value], 1)
+            return self.emit(bytecode.CONSTANT, self.parameters[node.value], 1)
         self.write_operation(node, constant)
         if constant and not frozen:
             # Parts without an input or a sensor have no derivatives, even where a function's own slope is infinite.
-            self.emit(FREEZE, 0, 0)
+            self.emit(bytecode.FREEZE, 0, 0)
 
     def write_definitions(self, node: SyntaxNode) -> None:
         around, self.defined = self.defined, []
@@ -590,7 +580,7 @@ class _ProgramWriter:
             self.write(definition)
             self.defined.append(self.depth - 1)
         self.write(body)
-        self.emit(KEEP, len(definitions), -len(definitions))
+        self.emit(bytecode.KEEP, len(definitions), -len(definitions))
         self.defined = around
 
     def write_operation(self, node: SyntaxNode, constant: bool) -> None:
@@ -598,17 +588,17 @@ class _ProgramWriter:
             if not (node.kind == "**" and arg is node.args[1] and is_small_integer(arg)):
                 self.write(arg, constant)
         if node.kind == "**" and is_small_integer(node.args[1]):
-            self.emit(WHOLE_POWER, int(node.args[1].value), 0)
+            self.emit(bytecode.WHOLE_POWER, int(node.args[1].value), 0)
         elif node.kind in _UNARY:
-            self.emit(CALL, _UNARY[node.kind], 0)
+            self.emit(bytecode.CALL, _UNARY[node.kind], 0)
         elif node.kind == "table":
-            self.emit(TABLE, self.tables[node.value], 0)
+            self.emit(bytecode.TABLE, self.tables[node.value], 0)
         elif node.kind == "function":
-            self.emit(FUNCTION, node.value, 1 - len(node.args))
+            self.emit(bytecode.FUNCTION, node.value, 1 - len(node.args))
         elif node.kind == "where":
-            self.emit(WHERE, 0, -2)
+            self.emit(bytecode.WHERE, 0, -2)
         elif node.kind == BETWEEN_SIDES:
-            self.emit(BLEND, 0, -2)
+            self.emit(bytecode.BLEND, 0, -2)
         else:
             for _ in node.args[1:]:
                 self.emit(_BINARY[node.kind], 0, -1)

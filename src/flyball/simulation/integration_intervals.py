@@ -143,7 +143,6 @@ def whole_motion() -> Segment:
     return Segment(lasts=math.inf)
 
 
-LAWS_PER_FORCE = 3  # laws of one force
 SLIVER = 2e-14  # shortest remainder of an interval that is integrated, relative to the largest time
 
 

@@ -312,9 +312,3 @@ class ImplicitSolver:
                 return w, float(np.linalg.slogdet(J)[0])
             last = size
         return None
-
-
-def unknown_symbols(nodes: Sequence[Any], definitions: Sequence[Definition]) -> list[Node]:
-    """Symbols of these definitions that occur in expressions."""
-    held = {x.index for x in symbols_of(nodes)}
-    return [w for d in definitions for w in d.symbols if w.index in held]
