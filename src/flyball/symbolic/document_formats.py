@@ -109,17 +109,58 @@ class Formula:
     parts: list[Formula] = field(default_factory=list)  # formulas whose right-hand sides add up to this one
 
 
+class SectionPart:
+    """A part of a section: what all kinds of blocks can do."""
+
+    def expressions(self) -> list[Any]:
+        """All expressions in the block."""
+        return []
+
+    def put(self, given: Iterator[Any]) -> None:
+        """Replace all expressions by the next ones given."""
+
+    def text_lines(self, width: int) -> list[str]:
+        """Lines of plain text."""
+        raise NotImplementedError
+
+    def latex(self) -> str:
+        """LaTeX for pdflatex."""
+        raise NotImplementedError
+
+
 @dataclass
-class Formulas:
+class Formulas(SectionPart):
     """A list of formulas with a heading."""
 
     title: str
     formulas: list[Formula]
     note: str = ""
 
+    def expressions(self) -> list[Any]:
+        """All expressions in the formulas."""
+        return [x for f in self.formulas for x in (f.right, *(c for c, _ in f.before), *(c for c, _ in f.after))]
+
+    def put(self, given: Iterator[Any]) -> None:
+        """Replace all expressions by the next ones given."""
+        for f in self.formulas:
+            f.right = next(given)
+            f.before = [(next(given), x) for _, x in f.before]
+            f.after = [(next(given), x) for _, x in f.after]
+
+    def text_lines(self, width: int) -> list[str]:
+        """Heading, and the lines of every formula."""
+        head = [f"{self.title}: {self.note}" if self.note else self.title] if self.title else []
+        return head + [line for f in self.formulas for line in text_formula(f, width)]
+
+    def latex(self) -> str:
+        """Heading, and every formula."""
+        note = f" \\textit{{{latex_words(self.note)}}}" if self.note else ""
+        head = f"\\paragraph{{{latex_words(self.title)}}}{note}\\mbox{{}}\n" if self.title else ""
+        return head + "\n".join(latex_formula(f) for f in self.formulas)
+
 
 @dataclass
-class Matrix:
+class Matrix(SectionPart):
     """left = a matrix with labelled rows and columns."""
 
     left: Tex
@@ -128,27 +169,88 @@ class Matrix:
     columns: tuple[Tex, ...]
     symmetric: bool = False
 
+    def expressions(self) -> list[Any]:
+        """All entries."""
+        return self.entries.ravel().tolist()
+
+    def put(self, given: Iterator[Any]) -> None:
+        """Replace all entries by the next ones given."""
+        for k in np.ndindex(self.entries.shape):
+            self.entries[k] = next(given)
+
+    def text_lines(self, width: int) -> list[str]:
+        """The matrix under its columns' names; entry by entry if it is too wide."""
+        printer = TextPrinter()
+        rows = [
+            [name.text, *("." if x == 0.0 else printer.expression(x) for x in row)]
+            for name, row in zip(self.rows, self.entries, strict=True)
+        ]
+        head = ["", *(c.text for c in self.columns)]
+        lines = text_table([head, *rows]) if self.columns else text_table(rows)
+        if max(map(len, lines), default=0) <= width:
+            return [f"  {self.left.text} =", *(f"  {line}" for line in lines)]
+        return [line for f in nonzero_entries(self) for line in text_formula(f, width)]
+
+    def latex(self) -> str:
+        """The matrix; entry by entry if it is too wide."""
+        made = matrix_cells(self)
+        if len(made) <= 30 and fits_width(made, LATEX_MATRIX_WIDTH):
+            body = " \\\\\n".join(" & ".join(row) for row in made)
+            columns = "c" * self.entries.shape[1]
+            array = rf"\left[\begin{{array}}{{{columns}}}" + f"\n{body}\n" + r"\end{array}\right]"
+            return rf"\[ {self.left.latex} = {array} \]"
+        return "\n".join(latex_formula(f) for f in nonzero_entries(self))
+
 
 @dataclass(frozen=True)
-class DataTable:
+class DataTable(SectionPart):
     """A table."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
+    def text_lines(self, width: int) -> list[str]:
+        """Rows with their columns under one another."""
+        return text_table([self.columns, *self.rows])
+
+    def latex(self) -> str:
+        """A table that may go over pages."""
+        share = 0.98 * (1.0 - 0.017 * (len(self.columns) - 1)) / len(self.columns)
+        columns = "".join(rf"p{{{share:.3f}\textwidth}}" for _ in self.columns)
+        head = " & ".join(rf"\textit{{{latex_words(c)}}}" for c in self.columns)
+        rows = " \\\\\n".join(" & ".join(map(latex_cell, row)) for row in self.rows)
+        start = rf"{{\small\begin{{longtable}}{{@{{}}{columns}@{{}}}}"
+        return f"{start}\n\\hline\n{head} \\\\\n\\hline\n\\endhead\n{rows} \\\\\n\\hline\n\\end{{longtable}}}}"
+
 
 @dataclass(frozen=True)
-class Paragraph:
+class Paragraph(SectionPart):
     """A paragraph."""
 
     text: str
 
+    def text_lines(self, width: int) -> list[str]:
+        """The text, in one line."""
+        return [self.text]
+
+    def latex(self) -> str:
+        """The text, in letters that the font has."""
+        return f"{latex_words(self.text)}\n"
+
 
 @dataclass(frozen=True)
-class Display:
+class Display(SectionPart):
     """A formula given as text."""
 
     formula: Tex
+
+    def text_lines(self, width: int) -> list[str]:
+        """The formula as text."""
+        return [self.formula.text]
+
+    def latex(self) -> str:
+        """The formula in a line of its own."""
+        return rf"\[ {self.formula.latex} \]"
 
 
 Block = Formulas | Matrix | DataTable | Paragraph | Display
@@ -173,31 +275,14 @@ class Document:
 
     def expressions(self) -> list[Any]:
         """All expressions in the document."""
-        out: list[Any] = []
-        for block in self._blocks():
-            if isinstance(block, Matrix):
-                out += block.entries.ravel().tolist()
-            else:
-                for f in block.formulas:
-                    out += [f.right, *(c for c, _ in f.before), *(c for c, _ in f.after)]
-        return out
+        return [x for section in self.sections for block in section.blocks for x in block.expressions()]
 
     def put(self, expressions: list[Any]) -> None:
         """Replace all expressions."""
         given = iter(expressions)
-        for block in self._blocks():
-            if isinstance(block, Matrix):
-                for k in np.ndindex(block.entries.shape):
-                    block.entries[k] = next(given)
-            else:
-                for f in block.formulas:
-                    f.right = next(given)
-                    f.before = [(next(given), x) for _, x in f.before]
-                    f.after = [(next(given), x) for _, x in f.after]
-
-    def _blocks(self) -> Iterator[Formulas | Matrix]:
         for section in self.sections:
-            yield from (b for b in section.blocks if isinstance(b, Formulas | Matrix))
+            for block in section.blocks:
+                block.put(given)
 
 
 ZERO = Tex("0", "0")
@@ -282,22 +367,8 @@ def text_document(document: Document, width: int = TEXT_WIDTH) -> str:
     for section in document.sections:
         out += ["", section.title, "-" * len(section.title)]
         for block in section.blocks:
-            out += text_lines(block, width)
+            out += block.text_lines(width)
     return "\n".join(out) + "\n"
-
-
-def text_lines(block: Block, width: int) -> list[str]:
-    """Lines of a block."""
-    if isinstance(block, Paragraph):
-        return [block.text]
-    if isinstance(block, Display):
-        return [block.formula.text]
-    if isinstance(block, DataTable):
-        return text_table([block.columns, *block.rows])
-    if isinstance(block, Matrix):
-        return text_matrix(block, width)
-    head = [f"{block.title}: {block.note}" if block.note else block.title] if block.title else []
-    return head + [line for f in block.formulas for line in text_formula(f, width)]
 
 
 def text_formula(f: Formula, width: int) -> list[str]:
@@ -311,19 +382,6 @@ def text_formula(f: Formula, width: int) -> list[str]:
     line = f"{before} = {after}{f'  [{f.unit}]' if f.unit else ''}"
     first, *others = broken_lines(line, width - 6)
     return [f"  {first}", *(f"      {x}" for x in others)]
-
-
-def text_matrix(m: Matrix, width: int) -> list[str]:
-    """A matrix under its columns' names; entry by entry if it is too wide."""
-    printer = TextPrinter()
-    rows = [
-        [m.rows[i].text, *("." if x == 0.0 else printer.expression(x) for x in row)] for i, row in enumerate(m.entries)
-    ]
-    head = ["", *(c.text for c in m.columns)]
-    lines = text_table([head, *rows]) if m.columns else text_table(rows)
-    if max(map(len, lines), default=0) <= width:
-        return [f"  {m.left.text} =", *(f"  {line}" for line in lines)]
-    return [line for f in nonzero_entries(m) for line in text_formula(f, width)]
 
 
 def text_table(rows: Sequence[Sequence[Cell]]) -> list[str]:
@@ -359,7 +417,7 @@ def latex_document(document: Document) -> str:
     out = [LATEX_PREAMBLE % (latex_words(document.title), latex_words(document.subtitle))]
     for section in document.sections:
         out.append(rf"\section*{{{latex_words(section.title)}}}")
-        out += [latex_block(block) for block in section.blocks]
+        out += [block.latex() for block in section.blocks]
     return "\n".join(out) + "\n\\end{document}\n"
 
 
@@ -371,45 +429,10 @@ def latex_words(text: str) -> str:
     return told.encode("latin-1", "replace").decode("latin-1")
 
 
-def latex_block(block: Block) -> str:
-    """A block."""
-    if isinstance(block, Paragraph):
-        return f"{latex_words(block.text)}\n"
-    if isinstance(block, Display):
-        return rf"\[ {block.formula.latex} \]"
-    if isinstance(block, DataTable):
-        return latex_table(block)
-    if isinstance(block, Matrix):
-        return latex_matrix(block)
-    note = f" \\textit{{{latex_words(block.note)}}}" if block.note else ""
-    head = f"\\paragraph{{{latex_words(block.title)}}}{note}\\mbox{{}}\n" if block.title else ""
-    return head + "\n".join(latex_formula(f) for f in block.formulas)
-
-
 def latex_formula(f: Formula) -> str:
     """A formula in lines."""
     unit = rf"\quad \text{{{latex_words(f.unit)}}}" if f.unit else ""
     return rf"\[ {aligned_lines(f, LATEX_WIDTH)}{unit} \]"
-
-
-def latex_matrix(m: Matrix) -> str:
-    """A matrix; entry by entry if it is too wide."""
-    made = matrix_cells(m)
-    if len(made) <= 30 and fits_width(made, LATEX_MATRIX_WIDTH):
-        body = " \\\\\n".join(" & ".join(row) for row in made)
-        columns = "c" * m.entries.shape[1]
-        return rf"\[ {m.left.latex} = \left[\begin{{array}}{{{columns}}}" + f"\n{body}\n" + r"\end{array}\right] \]"
-    return "\n".join(latex_formula(f) for f in nonzero_entries(m))
-
-
-def latex_table(t: DataTable) -> str:
-    """A table that may go over pages."""
-    share = 0.98 * (1.0 - 0.017 * (len(t.columns) - 1)) / len(t.columns)
-    columns = "".join(rf"p{{{share:.3f}\textwidth}}" for _ in t.columns)
-    head = " & ".join(rf"\textit{{{latex_words(c)}}}" for c in t.columns)
-    rows = " \\\\\n".join(" & ".join(map(latex_cell, row)) for row in t.rows)
-    start = rf"{{\small\begin{{longtable}}{{@{{}}{columns}@{{}}}}"
-    return f"{start}\n\\hline\n{head} \\\\\n\\hline\n\\endhead\n{rows} \\\\\n\\hline\n\\end{{longtable}}}}"
 
 
 def latex_cell(c: Cell) -> str:
