@@ -10,8 +10,7 @@ import numpy as np
 
 import flyball as fb
 from flyball.assembly.assemble import assemble
-from flyball.simulation.impulse_stepping.setup import make_stepper, movers_of_assembly, partition_bodies
-from flyball.simulation.impulse_stepping.step_size import choose_step
+from flyball.simulation.impulse_stepping.setup import choose_step, make_stepper, movers_of_assembly, partition_bodies
 from flyball.tables.contact_tables import contact_tables
 
 

@@ -9,15 +9,15 @@ import time
 
 import numpy as np
 
-from flyball.collision.broad_phase.workspace import Search
 from flyball.collision.contact_finder import ContactFinder, no_movers
 from flyball.collision.contact_search import REBUILD, STEP
 from flyball.collision.shape_kinds import PLANE, SPHERE
 from flyball.collision.tables import (  # fmt: skip
-    Contacts,
+    ContactTable,
     Dimensions,
     Geometry,
     Movers,
+    Search,
     Shapes,
 )
 from flyball.compiler.formulas import call, formula
@@ -41,7 +41,7 @@ def go(address, G, M, C, O, B, h, steps, task):
 
 @kernel
 def go_kernel(
-    address: int, G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, h: float, steps: int, task: int
+    address: int, G: Geometry, M: Movers, C: ContactTable, O: ContactTable, B: Search, h: float, steps: int, task: int
 ) -> int:
     return go(address, G, M, C, O, B, h, steps, task)
 

@@ -166,8 +166,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .studies.study import load_study as load_study
     from .symbolic.equations import Equations as Equations
     from .symbolic.explicit.explicit_equations import ExplicitEquations as ExplicitEquations
-    from .symbolic.explicit.state_space import StateEquations as StateEquations
-    from .symbolic.export.code import Code as Code
+    from .symbolic.explicit.explicit_equations import StateEquations as StateEquations
+    from .symbolic.export import Code as Code
     from .symbolic.expressions import Expressions as Expressions
     from .symbolic.linear.linear_equations import LinearEquations as LinearEquations
     from .symbolic.linear.stability import StabilityConditions as StabilityConditions
@@ -237,13 +237,13 @@ _HOME = {
     "Singularities": "results.singularities",
     "Study": "results.study",
     "Touch": "results.equilibrium",
-    "Code": "symbolic.export.code",
+    "Code": "symbolic.export",
     "Equations": "symbolic.equations",
     "ExplicitEquations": "symbolic.explicit.explicit_equations",
     "Expressions": "symbolic.expressions",
     "LinearEquations": "symbolic.linear.linear_equations",
     "StabilityConditions": "symbolic.linear.stability",
-    "StateEquations": "symbolic.explicit.state_space",
+    "StateEquations": "symbolic.explicit.explicit_equations",
     "TransferFunction": "symbolic.linear.transfer_functions",
 }
 _ROOMS = ("model.shapes", "joints", "forces", "controllers")

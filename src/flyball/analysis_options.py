@@ -23,7 +23,7 @@ _LISTS = (list, tuple, np.ndarray)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class AnalysisOptions:
     """Base class of the options of an analysis; times are converted to numbers [s], lists of names to tuples."""
 
     @classmethod
@@ -58,7 +58,7 @@ class _OptionSpec(NamedTuple):
 _OPTION_SPECS: dict[type, _OptionSpec] = {}
 
 
-def _option_spec(cls: type[Options]) -> _OptionSpec:
+def _option_spec(cls: type[AnalysisOptions]) -> _OptionSpec:
     """Return the checks of an options class (cached)."""
     if cls not in _OPTION_SPECS:
         every = fields(cls)
@@ -68,7 +68,7 @@ def _option_spec(cls: type[Options]) -> _OptionSpec:
     return _OPTION_SPECS[cls]
 
 
-def names_of(cls: type[Options]) -> tuple[str, ...]:
+def names_of(cls: type[AnalysisOptions]) -> tuple[str, ...]:
     """Return the names of the options of a class."""
     return _option_spec(cls).names
 
@@ -145,7 +145,7 @@ def _parameters(value: Any, _: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AssembleOptions(Options):
+class AssembleOptions(AnalysisOptions):
     """Options of `Mechanism.assemble`."""
 
     t: float

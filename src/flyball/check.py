@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .analysis_options import Options
+from .analysis_options import AnalysisOptions
 from .assembly.assemble import assemble
 from .assembly.assembled_state import Assembly
 from .errors import FlyballError
@@ -24,9 +24,9 @@ from .model.inertia import parallel_axis_term, principal
 from .model.model import Model
 from .model.unsupported_elements import ignored_elements
 from .results.health import changed_velocities, velocity_not_allowed
-from .results.mechanism_report import BodyReport, MassProperties, MassReport, Report
+from .results.mechanism_report import BodyReport, MassReport, PrincipalMassProperties, Report
 from .results.mobility import Mobility
-from .results.recorded_kinematics import RecordedMotion
+from .results.motion_record import RecordedMotion
 from .simulation.law_faults import out_of_table_at_start
 from .tables.contact_tables import Carriers, contact_carriers
 from .tables.structure import structure
@@ -34,7 +34,7 @@ from .tables.values import Values, values
 
 
 @dataclass(frozen=True, kw_only=True)
-class MassOptions(Options):
+class MassOptions(AnalysisOptions):
     """Options of `Mechanism.mass_properties`."""
 
     drawn: bool
@@ -88,13 +88,15 @@ def _combined_mass(at: Carriers) -> tuple[float, np.ndarray, np.ndarray]:
 
 def _mass_properties(
     mass: float, com: np.ndarray, position: np.ndarray, J: np.ndarray, volume: Any, planar: bool
-) -> MassProperties:
+) -> PrincipalMassProperties:
     volume = None if volume is None else float(volume.real)
     if planar:
         w = J[2:, 2]
-        return MassProperties(mass, com[:2], position[:2], float(w[0]), w, np.eye(3), _gyration_radii(w, mass), volume)
+        return PrincipalMassProperties(
+            mass, com[:2], position[:2], float(w[0]), w, np.eye(3), _gyration_radii(w, mass), volume
+        )
     w, V = principal(J)
-    return MassProperties(mass, com, position, J, w, V, _gyration_radii(w, mass), volume)
+    return PrincipalMassProperties(mass, com, position, J, w, V, _gyration_radii(w, mass), volume)
 
 
 def _gyration_radii(w: np.ndarray, mass: float) -> np.ndarray:
@@ -153,7 +155,7 @@ def check(model: Model) -> Report:
     )
 
 
-def _body_report(b: MassProperties, planar: bool) -> BodyReport:
+def _body_report(b: PrincipalMassProperties, planar: bool) -> BodyReport:
     axes = () if planar else tuple(map(tuple, b.axes.T.tolist()))
     return BodyReport(b.mass, tuple(b.com.tolist()), tuple(b.moments.tolist()), axes)
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from .simulation.integration_options import Stepping
     from .simulation.stepper import Stepper
     from .symbolic.equations import Equations
-    from .symbolic.export.code import Code
+    from .symbolic.export import Code
 else:
     Model = object  # a mixin of Mechanism; this import is for type checkers only
 

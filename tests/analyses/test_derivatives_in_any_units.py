@@ -12,8 +12,8 @@ import scales
 
 import flyball as fb
 from flyball.derivatives.equation_derivatives import COMPLEX_STEP, complex_step_derivative
-from flyball.sensitivity.eigenvalue_derivatives import entry_units
 from flyball.sensitivity.parameter_derivatives import difference_derivative
+from flyball.sensitivity.sensitivity import entry_units
 
 CASES = dict(scales.cases(0))
 

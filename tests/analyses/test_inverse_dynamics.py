@@ -297,11 +297,11 @@ def test_joints_together_on_either_body(coordinates):
 def test_many_dependencies_are_counted_by_pivots(monkeypatch):
     """22 driven windows: 462 rows of which 396 can be independent, taken for a large mechanism; 66 are too many."""
     from flyball.kinematics import inverse_dynamics
-    from flyball.numerics import sparse_rank
+    from flyball.numerics import rank
 
     m = windows(22)
     m.add(*[fb.Driver(f"drive{k}", f"A{k}.angle", "0.1*t") for k in range(22)])
-    for module in (inverse_dynamics, sparse_rank):
+    for module in (inverse_dynamics, rank):
         monkeypatch.setattr(module, "MAX_DOUBTFUL_SVD_SIZE", 0)
     found = m.inverse_dynamics([0.1])
     assert found.determinacy.count.tolist() == [66]

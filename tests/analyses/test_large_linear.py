@@ -13,7 +13,7 @@ import scipy.sparse as sp
 import flyball as fb
 from flyball.linear import descriptor
 from flyball.numerics.eigen import QuadraticPencil
-from flyball.numerics.sparse_rank import saddle_point_solver
+from flyball.numerics.rank import saddle_point_solver
 from tests.analyses.made import G, chain, parallelogram, rod
 from tests.layers import LAYERS
 

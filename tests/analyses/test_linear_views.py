@@ -12,7 +12,7 @@ import pytest
 
 import flyball as fb
 from flyball.cli.application import show_notices
-from flyball.compiler import announcements
+from flyball.compiler import object_files
 from flyball.engine.entry_point import engine
 from flyball.view.linear_plots import _unit_ratio, bode_frequencies, phase
 from tests.analyses.classical import bicycle, stand
@@ -258,21 +258,21 @@ def test_what_falls_for_ever_has_no_equilibrium(here: Path) -> None:
 
 def test_what_is_compiled_is_said_before(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     """On a command line as a plain line; nothing is said of what takes no time."""
-    monkeypatch.setattr(announcements, "_scale", [1.0])
-    monkeypatch.setitem(announcements.COSTS, "engine", ("the equations of motion", 18.0))
+    monkeypatch.setattr(object_files, "_scale", [1.0])
+    monkeypatch.setitem(object_files.COSTS, "engine", ("the equations of motion", 18.0))
     with (
         pytest.warns(fb.PerformanceNotice, match=r"once: the equations of motion, about 20 s"),
-        announcements.announce_compilation(engine),
+        object_files.announce_compilation(engine),
     ):
         pass
     with warnings.catch_warnings():
         show_notices(True)
-        monkeypatch.setattr(announcements, "_scale", [3.0])
-        with announcements.announce_compilation(engine):
+        monkeypatch.setattr(object_files, "_scale", [3.0])
+        with object_files.announce_compilation(engine):
             pass
         assert capsys.readouterr().err.strip().endswith("the equations of motion, about 55 s")
         show_notices(False)
-        with announcements.announce_compilation(engine):
+        with object_files.announce_compilation(engine):
             pass
     assert capsys.readouterr().err == ""
 

@@ -163,15 +163,15 @@ def test_a_long_chain_is_counted_by_the_sparse_rank():
 def test_large_mechanisms_are_told_the_same(make, monkeypatch):
     """The sparse way, which large mechanisms take, names the same joints and reactions as the dense one."""
     from flyball.mobility import null_spaces
-    from flyball.numerics import sparse_rank
+    from flyball.numerics import rank
 
     m = make()
     a = assemble(m)
     dense = mobility(m, a)
-    for module in (null_spaces, sparse_rank):
+    for module in (null_spaces, rank):
         monkeypatch.setattr(module, "MAX_SVD_SIZE", 0)
     assert mobility(m, a) == dense
-    for module in (null_spaces, sparse_rank):
+    for module in (null_spaces, rank):
         monkeypatch.setattr(module, "MAX_DOUBTFUL_SVD_SIZE", 0)
     assert mobility(m, a) == dense
 
@@ -236,13 +236,13 @@ def test_sets_of_a_large_mechanism_are_counted_where_they_are_not_all_sought(mon
 
 def test_a_list_that_is_cut_says_so(monkeypatch):
     """Where there is no room for all dependencies the true count stands beside what is named."""
-    from flyball.numerics import sparse_rank
+    from flyball.numerics import rank
 
     m = windows(5)
     a = assemble(m)
     for name in ("MAX_SVD_SIZE", "MAX_DOUBTFUL_SVD_SIZE"):
-        monkeypatch.setattr(sparse_rank, name, 0)
-    monkeypatch.setattr(sparse_rank, "ROOM", 700)  # 7 vectors of 100 rows
+        monkeypatch.setattr(rank, name, 0)
+    monkeypatch.setattr(rank, "ROOM", 700)  # 7 vectors of 100 rows
     found = mobility(m, a)
     assert found.redundancy == 15
     words = "named are those that 7 of 15 constraints too many touch: there may be more"

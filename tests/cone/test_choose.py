@@ -7,7 +7,6 @@ import pytest
 
 from flyball.numerics.complementarity.contact_problem import CONVERGED, FactorStorage, allocate_solver, empty_problem
 from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
-from flyball.numerics.complementarity.islands import islands_of
 from flyball.numerics.complementarity.solver_choice import (
     CALLS,
     ISLANDS,
@@ -17,6 +16,7 @@ from flyball.numerics.complementarity.solver_choice import (
     PASSED_ON,
     SMALL_CONTACTS,
     SMALL_SOLVED,
+    islands_of,
     prepare_solver,
     solver_names,
 )

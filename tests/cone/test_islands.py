@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from flyball.numerics.complementarity.islands import islands_of
+from flyball.numerics.complementarity.solver_choice import islands_of
 
 
 def components(at, line_at, nodes, groups):

@@ -12,7 +12,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from flyball.collision.convex_decomposition import Hull, convex_hull
+from flyball.collision.convex_decomposition import ConvexPolyhedron, convex_hull
 from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, HULL, SPHERE
 from flyball.collision.tables import (
     Dimensions,
@@ -42,7 +42,7 @@ class Some:
 
     kind: int
     par: np.ndarray
-    hull: Hull | None = None
+    hull: ConvexPolyhedron | None = None
 
     @property
     def rounding(self) -> float:

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import flyball as fb
 from flyball import forces
-from flyball.constraints.switches.guard_kinds import FROZEN, STATIC
+from flyball.constraints.switches.switch_kind import FROZEN, STATIC
 from flyball.math.rotation import log_gradient, rotation_vector
 from flyball.model.force import CoordinateForce
 from flyball.testing.formula_checks import (

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switches.guard_kinds import G_HOLDS, G_UPPER, OFF
-from flyball.constraints.switches.switch_kind import ANY_FORCE, INTERVAL
+from flyball.constraints.switches.switch_kind import ANY_FORCE, G_HOLDS, G_UPPER, INTERVAL, OFF
 from flyball.elements import Number, ProblemRow, Switch, SwitchKind, Unilateral, element
 from flyball.model.element import Element
 from flyball.numerics.complementarity.dense_problem import AT_REST, BILATERAL, FRICTION_LINE

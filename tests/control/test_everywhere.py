@@ -9,7 +9,7 @@ from scipy.linalg import expm
 import flyball as fb
 from flyball.simulation import checkpoints as keeper
 from flyball.simulation.events import event_loop
-from flyball.simulation.implicit.integrators import implicit_integrator
+from flyball.simulation.implicit_integrators import implicit_integrator
 from tests.checkpoints.motions import cut, killed
 from tests.control.slide import TIGHT, slide
 

@@ -7,7 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import compile_mechanism
-from flyball.constraints.switches.guard_kinds import HELD, OFF
+from flyball.constraints.switches.switch_kind import HELD, OFF
 from flyball.engine.entry_point import MOTION
 from flyball.engine.loads import SLOPES_UNKNOWN
 from flyball.model.contact_point import Touch

@@ -7,8 +7,8 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import compile_mechanism
-from flyball.constraints.switches.guard_kinds import G_LAW, HELD
 from flyball.constraints.switches.lock import LOCK
+from flyball.constraints.switches.switch_kind import G_LAW, HELD
 from flyball.engine.entry_point import MOTION
 from flyball.engine.guards import evaluate_guards
 from flyball.tables.constraint_rows import joint_row_name, released_joints

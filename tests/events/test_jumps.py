@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switches.guard_kinds import HELD
 from flyball.constraints.switches.stop import STOP
+from flyball.constraints.switches.switch_kind import HELD
 from flyball.simulation.events.resolution import resolve_start
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import kicked, modes, moving, standing

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.constraints.switches.guard_kinds import HELD, OFF
 from flyball.constraints.switches.latches import ONE_WAY
 from flyball.constraints.switches.stop import STOP
+from flyball.constraints.switches.switch_kind import HELD, OFF
 from flyball.engine.entry_point import MOTION
 from flyball.simulation.events.resolution import resolve_start
 from tests.events.one_row import BOTH, Row, forgotten, rows

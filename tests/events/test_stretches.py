@@ -10,8 +10,8 @@ import pytest
 
 import flyball as fb
 from flyball.assembly.compiled_mechanism import CompiledMechanism
-from flyball.constraints.switches.guard_kinds import HELD
 from flyball.constraints.switches.lock import LOCK
+from flyball.constraints.switches.switch_kind import HELD
 from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
 from flyball.model.force import Switch

@@ -10,10 +10,9 @@ import pytest
 import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.assembly.compiled_mechanism import compile_mechanism
-from flyball.constraints.switches.guard_kinds import HELD, OFF, STEADY
 from flyball.constraints.switches.lock import LOCK
 from flyball.constraints.switches.stop import STOP
-from flyball.constraints.switches.switch_kind import SwitchKind
+from flyball.constraints.switches.switch_kind import HELD, OFF, STEADY, SwitchKind
 from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
 from flyball.model.force import Switch

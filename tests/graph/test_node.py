@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball.expression_graph.evaluation import (
+from flyball.expression_graph.graph import (
+    Graph,
+    Symbol,
+    UndeterminedDecision,
     directional_derivatives,
     evaluate,
     jacobian,
@@ -14,7 +17,6 @@ from flyball.expression_graph.evaluation import (
     substitute,
     symbols_of,
 )
-from flyball.expression_graph.graph import Graph, Symbol, UndeterminedDecision
 from flyball.math import scalar
 from flyball.math.vec import mm, quaternion_matrix
 
@@ -81,7 +83,7 @@ def test_a_name_stands_for_one_thing():
 
 
 def test_tables_keep_their_names_and_derivatives_have_primes():
-    from flyball.expression_graph.evaluation import directional_derivatives
+    from flyball.expression_graph.graph import directional_derivatives
     from flyball.expression_graph.printers.latex import latex
     from flyball.expression_graph.printers.text import text
     from flyball.model.table import Table

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import evaluate, jacobian
-from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.graph import Graph, Symbol, evaluate, jacobian
 from flyball.expression_graph.printers import routines as limits
 from flyball.expression_graph.printers.c import c_sources
 from flyball.expression_graph.printers.casadi import casadi_function

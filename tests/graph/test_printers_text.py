@@ -8,8 +8,7 @@ import pytest
 import sympy
 from sympy.parsing.sympy_parser import parse_expr
 
-from flyball.expression_graph.evaluation import evaluate
-from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.graph import Graph, Symbol, evaluate
 from flyball.expression_graph.printers import latex as latex_printer
 from flyball.expression_graph.printers import text as text_printer
 from flyball.expression_graph.printers.formula_layout import latex_name

@@ -7,12 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flyball.expression_graph.evaluation import evaluate, nodes_in_order
-from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.graph import Graph, evaluate, nodes_in_order
 from flyball.expression_graph.printers.text import text
-from flyball.expression_graph.simplification.arctangents import ArctangentSubstitution
-from flyball.expression_graph.simplification.reading_cost import exact_number, without_rounding
-from flyball.expression_graph.simplification.simplify import simplified
+from flyball.expression_graph.simplification.factors import exact_number, without_rounding
+from flyball.expression_graph.simplification.simplify import ArctangentSubstitution, simplified
 from flyball.math import scalar
 
 NAMES = ("a", "b", "x", "y", "u", "v")

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from flyball.expression_graph.evaluation import evaluate, nodes_in_order
-from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.graph import Graph, evaluate, nodes_in_order
 from flyball.expression_graph.printers.formula_layout import wrap_fragments
 from flyball.expression_graph.printers.text import TextPrinter, text
-from flyball.expression_graph.simplification.common_subexpressions import (
+from flyball.expression_graph.simplification.factors import symbol_count
+from flyball.expression_graph.simplification.simplify import (
     extract_common_subexpressions,
+    simplified,
     simplified_with_symbols,
 )
-from flyball.expression_graph.simplification.reading_cost import symbol_count
-from flyball.expression_graph.simplification.simplify import simplified
 from flyball.math.scalar import cos, sin, sqrt
 
 

@@ -9,8 +9,7 @@ import sympy
 from scipy.interpolate import CubicSpline
 
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import directional_derivatives, evaluate
-from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.graph import Graph, Symbol, directional_derivatives, evaluate
 from flyball.expression_graph.printers.sympy import SympyPrinter, fraction
 from flyball.math import scalar
 from flyball.math.spline import pack_spline

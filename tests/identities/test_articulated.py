@@ -15,7 +15,7 @@ from flyball.engine.articulated_body import factor_articulated, mass_entries, so
 from flyball.engine.entry_point import MOTION
 from flyball.engine.kinematics import twist_column
 from flyball.math.vec import quaternion_matrix
-from flyball.results.recorded_kinematics import RecordedMotion
+from flyball.results.motion_record import RecordedMotion
 from flyball.tables.table_definitions import (
     FREE,
     PLANAR,

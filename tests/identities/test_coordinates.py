@@ -12,7 +12,7 @@ from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.engine.articulated_body import mass_entries
 from flyball.engine.entry_point import MOTION
 from flyball.engine.kinematics import load_record
-from flyball.results.recorded_kinematics import RecordedMotion
+from flyball.results.motion_record import RecordedMotion
 from flyball.tables import reference_configuration
 from flyball.tables.coordinate_choice import least_cost, right_hand_side_cost
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar

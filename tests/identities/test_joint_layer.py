@@ -12,7 +12,7 @@ from flyball import joints as room
 from flyball.assembly.assemble import assemble
 from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.engine.entry_point import MOTION
-from flyball.results.recorded_kinematics import RecordedMotion
+from flyball.results.motion_record import RecordedMotion
 from tests.contract.zoo import CASES, declared, two_bodies
 
 HINGES = ["H0", "H1"]

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from flyball.numerics.rank import null_space
-from flyball.numerics.sparse_rank import (
+from flyball.numerics.rank import (
     MAX_SVD_SIZE,
     clearly_independent,
     negative_pivots,
     null_basis,
+    null_space,
     null_spaces,
     rank_by_pivots,
     sparse_matrix_rank,

@@ -5,12 +5,12 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import flyball as fb
-from flyball.constraints.switches.guard_kinds import HELD, OFF
+from flyball.constraints.switches.switch_kind import HELD, OFF
 from flyball.derivatives.equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState
 from flyball.engine.calls import INERTIAL_TERMS, RESIDUAL_TERMS, ResidualBatch
 from flyball.engine.residual import residuals_kernel
-from flyball.simulation.implicit.jacobian_pattern import jacobian_layout
 from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.jacobian_pattern import jacobian_layout
 from flyball.simulation.method_choice import with_contact_points
 from flyball.tables.table_definitions import SLIDING
 from tests.contract.test_everything import everything

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.expression_graph.graph import Graph
-from flyball.expression_graph.joint_efforts import law_tree
+from flyball.expression_graph.tracing import law_tree
 from flyball.laws.breakpoints import find_corners
 from flyball.laws.bytecode import BY_MOTION, COPY, evaluate, evaluate_jet
 from flyball.laws.compilation import compile_law

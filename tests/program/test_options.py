@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import flyball
 import flyball as fb
-from flyball.analysis_options import Options
+from flyball.analysis_options import AnalysisOptions
 from flyball.cli import app
 from flyball.cli.options import argument_help, first_doc_line
 from flyball.mechanism_methods import DesignMethods, MobilityMethods, MotionMethods, StaticsMethods
@@ -24,7 +24,7 @@ from flyball.sensitivity import sensitivity
 from flyball.simulation.method_choice import AUTO_METHOD, IMPLICIT_METHODS, IMPULSE_METHOD
 from flyball.studies import study
 from flyball.studies.sampling import LISTED_DESIGNS, SAMPLED_DESIGNS
-from flyball.symbolic.export.code import LANGUAGES
+from flyball.symbolic.export import LANGUAGES
 
 FAMILIES = (MotionMethods, StaticsMethods, DesignMethods, MobilityMethods)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}
@@ -47,7 +47,7 @@ NOT_FILED = {("equilibrium", "start"), ("equilibria", "start")}  # equilibria ha
 OTHERWISE = {("singularities", "branch")}  # by its number in the table, of a second search
 
 
-def option_classes() -> dict[str, type[Options]]:
+def option_classes() -> dict[str, type[AnalysisOptions]]:
     for module in pkgutil.walk_packages(flyball.__path__, "flyball."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
@@ -55,7 +55,7 @@ def option_classes() -> dict[str, type[Options]]:
     def below(c: type) -> list[type]:
         return [c, *(d for s in c.__subclasses__() for d in below(s))]
 
-    return {c.__name__: c for c in below(Options)}
+    return {c.__name__: c for c in below(AnalysisOptions)}
 
 
 CLASSES = option_classes()

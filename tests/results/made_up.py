@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 
 import flyball as fb
-from flyball.results.body_sets import BodySetMotion
 from flyball.results.contacts import ContactBodies, Contacts, Convergence
 from flyball.results.health import ContactHealth, Health
+from flyball.results.part_views.bodies import BodySetMotion
 from flyball.results.result import Result
 from flyball.tables.structure import structure
 from flyball.tables.values import values

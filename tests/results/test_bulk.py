@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.results.body_sets import BodySetMotion
+from flyball.results.part_views.bodies import BodySetMotion
 from tests.results.made_up import slider_crank
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler.announcements import announce_compilation, compiled_since
 from flyball.compiler.kernels import kernel
 from flyball.compiler.object_code import baseline, compile_kernel
+from flyball.compiler.object_files import announce_compilation, compiled_since
 from flyball.compiler.struct_layout import Float1
 from flyball.view.report import report_html
 from tests.results.made_up import slider_crank

@@ -15,8 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import scales
 from fuzzing import content, scenes
 
-from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from flyball.derivatives.force_balance import residual_rounding
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState, residual_rounding
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"

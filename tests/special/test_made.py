@@ -12,7 +12,7 @@ import pytest
 
 import flyball as fb
 from flyball import codegen
-from flyball.codegen import store
+from flyball.codegen import machine_code
 from flyball.codegen.procedures import ProcedureRecorder
 from flyball.compiler.kernels import StructBuffer
 from flyball.compiler.object_files import read_object
@@ -216,19 +216,19 @@ def test_code_is_known_by_the_values_that_formulas_decided_by():
     changed = [("force_parameters", int(k)) for k in np.flatnonzero(of != others)]
     same = [("bodies.inertia", k) for k in range(4)]
     assert changed
-    assert store.digest(x, changed) != store.digest(other, changed)
-    assert store.digest(x, same) == store.digest(other, same)
+    assert machine_code.digest(x, changed) != machine_code.digest(other, changed)
+    assert machine_code.digest(x, same) == machine_code.digest(other, same)
 
 
 def test_files_on_disk(tmp_path, monkeypatch):
     m = example("governor.toml")
     x, _ = values_of(m)
     plan = codegen.plan(x)
-    monkeypatch.setattr(store, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "_folder", lambda: tmp_path)
 
     def forget():
-        for key in [k for k in store._found if k[0] == plan.key]:
-            del store._found[key]
+        for key in [k for k in machine_code._found if k[0] == plan.key]:
+            del machine_code._found[key]
 
     forget()
     assert codegen.known(plan, x) == ""

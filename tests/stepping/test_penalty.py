@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.simulation.impulse_stepping.compliant_contact import mean_elastic_force
+from flyball.simulation.impulse_stepping.contact_laws import mean_elastic_force
 
 G, R = 9.81, 0.1
 K = 1e7

@@ -10,7 +10,7 @@ from flyball.collision.tables import no_contacts
 from flyball.numerics.complementarity.contact_operator import to_world_frame
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 from flyball.simulation.impulse_stepping.contact_constraints import account_contact, account_rolling, warm_start
-from flyball.simulation.impulse_stepping.restitution import add_expansion
+from flyball.simulation.impulse_stepping.contact_laws import add_expansion
 from flyball.simulation.impulse_stepping.stepping_tables import (
     ContactMemory,
     initial_run_state,

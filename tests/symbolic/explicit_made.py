@@ -8,9 +8,9 @@ import numpy as np
 
 import flyball as fb
 from flyball.engine.calls import MOTION
-from flyball.expression_graph.evaluation import evaluate
+from flyball.expression_graph.graph import evaluate
 from flyball.simulation.initial_state import find_initial_state
-from flyball.symbolic.explicit.state_space import StateEquations
+from flyball.symbolic.explicit.explicit_equations import StateEquations
 
 
 def pendulum() -> fb.Mechanism:

@@ -11,9 +11,8 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import evaluate, symbols_of
-from flyball.expression_graph.graph import Node
-from flyball.symbolic.document.parts import Formulas, Matrix
+from flyball.expression_graph.graph import Node, evaluate, symbols_of
+from flyball.symbolic.document_formats import Formulas, Matrix
 from tests.mechanisms import example
 
 

@@ -9,7 +9,7 @@ import flyball as fb
 from flyball import forces
 from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.engine.entry_point import MOTION
-from flyball.expression_graph.evaluation import evaluate_array
+from flyball.expression_graph.graph import evaluate_array
 from flyball.expression_graph.tracing import object_tables, trace_equations
 from flyball.model.contact import has_contact
 from flyball.tables.coordinate_choice import spanning_joints

@@ -8,8 +8,7 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import nodes_in_order
-from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.graph import Graph, nodes_in_order
 from flyball.expression_graph.tracing import parameter_symbols
 from tests import mechanisms
 from tests.contract import zoo

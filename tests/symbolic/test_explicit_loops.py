@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.expression_graph.evaluation import evaluate
-from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.graph import Graph, Symbol, evaluate
 from flyball.symbolic.explicit.closed_form_loops import solve_single
-from flyball.symbolic.explicit.zero_test import Probe
+from flyball.symbolic.explicit.definitions import Probe
 from tests.analyses.linkages import whitworth
 from tests.mechanisms import example, planar_rod
 from tests.symbolic.explicit_made import differs, states_of

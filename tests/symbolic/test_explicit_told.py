@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.expression_graph.evaluation import evaluate, nodes_in_order
-from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.graph import Graph, evaluate, nodes_in_order
 from flyball.expression_graph.simplification.simplify import simplified
 
 AT = {"A.angle": 0.3, "A.angle'": 0.7}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.expression_graph.evaluation import evaluate, jacobian
-from flyball.symbolic.export.code import LANGUAGES
+from flyball.expression_graph.graph import evaluate, jacobian
+from flyball.symbolic.export import LANGUAGES
 from tests.symbolic.exported import Library, close, example, given_at, rubbing, states
 
 

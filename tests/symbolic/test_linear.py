@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.expression_graph.evaluation import evaluate
+from flyball.expression_graph.graph import evaluate
 from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.analyses.classical import bicycle, column, stand
 from tests.analyses.made import G, chain, conical_pendulum, parallelogram, rod, watt

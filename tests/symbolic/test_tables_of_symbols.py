@@ -7,7 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import evaluate_array
+from flyball.expression_graph.graph import evaluate_array
 from flyball.expression_graph.tracing import object_tables, trace_equations, trace_model
 from flyball.tables.coordinate_choice import spanning_joints
 from flyball.tables.values import values

@@ -5,7 +5,7 @@ import pytest
 
 from flyball.engine.kinematics import load_record
 from flyball.errors import ModelError
-from flyball.expression_graph.evaluation import evaluate
+from flyball.expression_graph.graph import evaluate
 from tests import mechanisms
 from tests.contract import zoo
 from tests.symbolic.states import random_state

@@ -38,6 +38,6 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         If no closed position, or no consistent velocity, is found; the message names the joints that disagree, by how
         much, and why.
     """
-    from ..mobility.contradictions import explain_contradiction  # mobility imports assembly
+    from ..mobility.mobility import explain_contradiction  # mobility imports assembly
 
     return consistent_state(model, t=t, parameters=parameters, explain=explain_contradiction)

@@ -1,6 +1,6 @@
 """Code generated for one mechanism: the engine's computations as straight-line code, compiled and called by address.
 
-``store.plan`` inspects a mechanism, ``store.code`` returns its code, ``GeneratedCode.system`` puts its addresses into
+``plan`` inspects a mechanism, ``code`` returns its code, ``GeneratedCode.system`` puts its addresses into
 the tables of one run. `procedures` runs the engine's loops on expressions: entries of the tables are symbols, so the
 same code serves other values; entries that are exactly 0, 1 or -1 are numbers and part of the key. `machine_code`
 translates procedures to LLVM text and machine code, in some 50 us for each operation. Loads are placed next to the
@@ -12,8 +12,7 @@ Imports the engine, `tables`, `laws` and the expression graph; nothing that simu
 `engine.calls` and its trace in `procedures`.
 """
 
-from .machine_code import GeneratedCode, Refused
-from .store import Plan, can_store, code, in_memory, known, plan, price, ready, refusal
+from .machine_code import GeneratedCode, Plan, Refused, can_store, code, in_memory, known, plan, price, ready, refusal
 
 __all__ = [
     "GeneratedCode",

@@ -43,8 +43,7 @@ from ..expression_graph.printers.llvm import (
 )
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import System, named_arrays
-from .machine_code import target_description
-from .store import sources_digest
+from .machine_code import sources_digest, target_description
 
 LANES = 4
 TASKS = (INVERSE_DYNAMICS, MASS_MATRIX, FORWARD_DYNAMICS, INVERSE_DERIVATIVES, FORWARD_DERIVATIVES)
@@ -340,63 +339,73 @@ COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894
 
 
 @lru_cache(maxsize=1)
-def sine_and_cosine() -> str:
-    """Function for the sines and cosines of a vector of angles up to `LARGEST_ANGLE`."""
-    out: list[str] = []
+class _Instructions:
+    """Instructions on vectors of numbers, in static single assignment: each method returns the name of its result."""
 
-    def new(text: str) -> str:
-        out.append(f"  %r{len(out)} = {text}")
-        return f"%r{len(out) - 1}"
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.add, self.sub, self.mul = (partial(self._two, operation) for operation in ("fadd", "fsub", "fmul"))
 
-    def splat(x: float) -> str:
-        return f"<{', '.join([f'double {constant(x)}'] * LANES)}>"
+    def new(self, text: str) -> str:
+        self.lines.append(f"  %r{len(self.lines)} = {text}")
+        return f"%r{len(self.lines) - 1}"
 
-    def two(operation: str, a: str, b: str) -> str:
-        return new(f"{operation} {VECTOR} {a}, {b}")
+    def _two(self, operation: str, a: str, b: str) -> str:
+        return self.new(f"{operation} {VECTOR} {a}, {b}")
 
-    add, sub, mul = (partial(two, operation) for operation in ("fadd", "fsub", "fmul"))
-
-    def exact_difference(a: str, b: str) -> tuple[str, str]:
+    def exact_difference(self, a: str, b: str) -> tuple[str, str]:
         """a - b, rounded, and its rounding error (Knuth)."""
-        s = sub(a, b)
-        back = sub(s, a)
-        return s, sub(sub(a, sub(s, back)), add(b, back))
+        s = self.sub(a, b)
+        back = self.sub(s, a)
+        return s, self.sub(self.sub(a, self.sub(s, back)), self.add(b, back))
 
-    def polynomial(z: str, coefficients: Sequence[float]) -> str:
-        total = splat(coefficients[-1])
+    def polynomial(self, z: str, coefficients: Sequence[float]) -> str:
+        """Polynomial in z by Horner's rule, the constant coefficient first."""
+        total = _splat(coefficients[-1])
         for c in coefficients[-2::-1]:
-            total = add(splat(c), mul(z, total))
+            total = self.add(_splat(c), self.mul(z, total))
         return total
 
-    k = new(f"call {VECTOR} @llvm.rint.v{LANES}f64({VECTOR} {mul('%x', splat(2.0 / np.pi))})")
-    first, second, third, rest = (mul(k, splat(part)) for part in HALF_PI)
-    r, error = exact_difference(sub("%x", first), second)
-    y, tail = exact_difference(r, sub(third, error))
+    def where(self, condition: str, a: str, b: str) -> str:
+        return self.new(f"select <{LANES} x i1> {condition}, {VECTOR} {a}, {VECTOR} {b}")
+
+    def compared(self, n: str, x: float, how: str = "oeq") -> str:
+        return self.new(f"fcmp {how} {VECTOR} {n}, {_splat(x)}")
+
+
+def _splat(x: float) -> str:
+    """A vector with the same number in all lanes."""
+    return f"<{', '.join([f'double {constant(x)}'] * LANES)}>"
+
+
+def sine_and_cosine() -> str:
+    """Function for the sines and cosines of a vector of angles up to `LARGEST_ANGLE`."""
+    o = _Instructions()
+    new, add, sub, mul, where = o.new, o.add, o.sub, o.mul, o.where
+    k = new(f"call {VECTOR} @llvm.rint.v{LANES}f64({VECTOR} {mul('%x', _splat(2.0 / np.pi))})")
+    first, second, third, rest = (mul(k, _splat(part)) for part in HALF_PI)
+    r, error = o.exact_difference(sub("%x", first), second)
+    y, tail = o.exact_difference(r, sub(third, error))
     tail = sub(tail, rest)
     z = mul(y, y)
     cube = mul(z, y)
-    inner = sub(mul(splat(0.5), tail), mul(cube, polynomial(z, SINE[1:])))
-    sine = sub(y, sub(sub(mul(z, inner), tail), mul(cube, splat(SINE[0]))))
-    half = mul(splat(0.5), z)
-    w = sub(splat(1.0), half)
-    ends = sub(mul(z, mul(z, polynomial(z, COSINE))), mul(y, tail))
-    cosine = add(w, add(sub(sub(splat(1.0), w), half), ends))
-    quarter = new(f"call {VECTOR} @llvm.floor.v{LANES}f64({VECTOR} {mul(k, splat(0.25))})")
-    n = sub(k, mul(splat(4.0), quarter))  # 0, 1, 2, 3: the quadrant
-
-    def where(condition: str, a: str, b: str) -> str:
-        return new(f"select <{LANES} x i1> {condition}, {VECTOR} {a}, {VECTOR} {b}")
-
-    def compared(x: float, how: str = "oeq") -> str:
-        return new(f"fcmp {how} {VECTOR} {n}, {splat(x)}")
-
-    one, three = compared(1.0), compared(3.0)
+    inner = sub(mul(_splat(0.5), tail), mul(cube, o.polynomial(z, SINE[1:])))
+    sine = sub(y, sub(sub(mul(z, inner), tail), mul(cube, _splat(SINE[0]))))
+    half = mul(_splat(0.5), z)
+    w = sub(_splat(1.0), half)
+    ends = sub(mul(z, mul(z, o.polynomial(z, COSINE))), mul(y, tail))
+    cosine = add(w, add(sub(sub(_splat(1.0), w), half), ends))
+    quarter = new(f"call {VECTOR} @llvm.floor.v{LANES}f64({VECTOR} {mul(k, _splat(0.25))})")
+    n = sub(k, mul(_splat(4.0), quarter))  # 0, 1, 2, 3: the quadrant
+    one, three = o.compared(n, 1.0), o.compared(n, 3.0)
     odd = new(f"or <{LANES} x i1> {one}, {three}")
-    near = new(f"fcmp ole {VECTOR} {new(f'call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} %x)')}, {splat(LARGEST_ANGLE)}")
+    near = new(
+        f"fcmp ole {VECTOR} {new(f'call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} %x)')}, {_splat(LARGEST_ANGLE)}"
+    )
     not_a_number = f"<{', '.join(['double 0x7FF8000000000000'] * LANES)}>"
     s, c = (where(near, a, not_a_number) for a in (where(odd, cosine, sine), where(odd, sine, cosine)))
-    upper = compared(2.0, "oge")
-    middle = new(f"or <{LANES} x i1> {one}, {compared(2.0)}")
+    upper = o.compared(n, 2.0, "oge")
+    middle = new(f"or <{LANES} x i1> {one}, {o.compared(n, 2.0)}")
     s = where(upper, new(f"fneg {VECTOR} {s}"), s)
     c = where(middle, new(f"fneg {VECTOR} {c}"), c)
     sine_only = new(f"insertvalue {PAIR} poison, {VECTOR} {s}, 0")
@@ -405,4 +414,4 @@ def sine_and_cosine() -> str:
         f"declare {VECTOR} @llvm.{name}.v{LANES}f64({VECTOR})" for name in ("rint", "floor", "sqrt", "fabs")
     )
     head = f"define internal {PAIR} @sine_and_cosine({VECTOR} %x) nounwind {{"
-    return "\n".join([declared, head, *out, f"  ret {PAIR} {pair}", "}"])
+    return "\n".join([declared, head, *o.lines, f"  ret {PAIR} {pair}", "}"])

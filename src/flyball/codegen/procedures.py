@@ -57,12 +57,6 @@ ROW = {name: first for name, (first, _) in Sensed.layout.entries.items()}
 POSE = range(KinematicRecords.layout.entries["angular_velocity"][0])
 """Entries of a kinematic record that are its pose."""
 PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that may be fixed in the code
-SOLVES = (
-    "STEP",
-    "STEP_UNLOADED",
-    "REFINE",
-    "DRIFT",
-)  # best in the order in which they are made
 
 
 def tables_of_symbols(

@@ -10,16 +10,27 @@ import numpy as np
 
 from ..compiler.kernels import Kernel
 from ..errors import ModelError
-from .broad_phase.workspace import (
+from . import shape_kinds
+from .contact_search import REBUILD, STEP, search
+from .narrow_phase.primitives import SCRATCH_ROWS
+from .tables import (
+    DONE,
+    FULL_CONTACTS,
+    FULL_PAIRS,
     IS_GENERIC,
     IS_PLANE,
     MAX_CLASSES,
+    NOT_FINITE,
     SIZE_LEVELS,
     Bounds,
+    ContactCounts,
+    ContactTable,
     Envelopes,
+    Geometry,
     LevelCells,
     LevelGrid,
     Motions,
+    Movers,
     MovingFrame,
     PairTable,
     Planes,
@@ -29,19 +40,6 @@ from .broad_phase.workspace import (
     SizeGroups,
     SlotPairs,
     Slots,
-)
-from .contact_search import REBUILD, STEP, search
-from .narrow_phase.primitives import SCRATCH_ROWS
-from .shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, PLANE, POLYGON, SPHERE
-from .tables import (
-    DONE,
-    FULL_CONTACTS,
-    FULL_PAIRS,
-    NOT_FINITE,
-    ContactCounts,
-    Contacts,
-    Geometry,
-    Movers,
     no_contacts,
 )
 
@@ -63,34 +61,34 @@ def bounding_volumes(G: Geometry) -> Bounds:
     size = np.full(len(kind), np.inf)
     for of, columns in _HALF_EDGES.items():
         half[kind == of] = np.stack(columns(*par[kind == of].T), axis=1)
-    middle[kind == CONE, 2] = 0.5 * par[kind == CONE, 1]
-    middle[kind == HEMISPHERE, 2] = 0.5 * par[kind == HEMISPHERE, 0]
-    for i in np.flatnonzero((kind == HULL) | (kind == POLYGON)):
+    middle[kind == shape_kinds.CONE, 2] = 0.5 * par[kind == shape_kinds.CONE, 1]
+    middle[kind == shape_kinds.HEMISPHERE, 2] = 0.5 * par[kind == shape_kinds.HEMISPHERE, 0]
+    for i in np.flatnonzero((kind == shape_kinds.HULL) | (kind == shape_kinds.POLYGON)):
         first, count = G.shape.first[i], G.shape.count[i]
         vertices = G.vertex[first : first + count]
         low, high = vertices.min(0), vertices.max(0)
         middle[i], half[i] = 0.5 * (low + high), 0.5 * (high - low) + par[i, 0]
         size[i] = np.linalg.norm(vertices - middle[i], axis=1).max() + par[i, 0]
-    for i in np.flatnonzero((kind == FIELD) & wide):
+    for i in np.flatnonzero((kind == shape_kinds.FIELD) & wide):
         heights = G.vertex[G.shape.first[i] :].ravel()[: int(par[i, 0] * par[i, 1])]
         half[i, 0] = heights.max()
     out = Bounds.blank(len(kind))
     axes = G.dimensions.axes.reshape(-1, 3, 3)
     out.centre = G.dimensions.place + np.einsum("nij,nj->ni", axes, middle)
     size = np.minimum(size, np.minimum(np.linalg.norm(half, axis=1), radius + np.linalg.norm(middle, axis=1)))
-    out.radius = np.where(wide, np.inf, np.where(kind == SPHERE, par[:, 0], size))
+    out.radius = np.where(wide, np.inf, np.where(kind == shape_kinds.SPHERE, par[:, 0], size))
     out.half_edges = half
     return out
 
 
 _HALF_EDGES = {  # half edges from the parameters of each kind
-    SPHERE: lambda r, a, b: (r, r, r),
-    BOX: lambda x, y, z: (x, y, z),
-    ELLIPSOID: lambda x, y, z: (x, y, z),
-    CAPSULE: lambda r, h, z: (r, r, r + h),
-    CYLINDER: lambda r, h, z: (r, r, h),
-    CONE: lambda r, h, z: (r, r, 0.5 * h),
-    HEMISPHERE: lambda r, a, b: (r, r, 0.5 * r),
+    shape_kinds.SPHERE: lambda r, a, b: (r, r, r),
+    shape_kinds.BOX: lambda x, y, z: (x, y, z),
+    shape_kinds.ELLIPSOID: lambda x, y, z: (x, y, z),
+    shape_kinds.CAPSULE: lambda r, h, z: (r, r, r + h),
+    shape_kinds.CYLINDER: lambda r, h, z: (r, r, h),
+    shape_kinds.CONE: lambda r, h, z: (r, r, 0.5 * h),
+    shape_kinds.HEMISPHERE: lambda r, a, b: (r, r, 0.5 * r),
 }
 
 
@@ -157,9 +155,9 @@ def search_workspace(G: Geometry, pairs: int, contacts: int) -> Search:
     count.bounded, count.wide, count.classes_exact = bounded.sum(), ns - bounded.sum(), exact
     slot = Slots.blank(ns)
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
-        form = IS_PLANE if G.shape.kind[i] == PLANE else IS_GENERIC
+        form = IS_PLANE if G.shape.kind[i] == shape_kinds.PLANE else IS_GENERIC
         slot[s] = i, G.shape.mover[i], 0, form, kin[i]
-    turning = ns if (G.shape.kind[bounded] != SPHERE).any() else 0
+    turning = ns if (G.shape.kind[bounded] != shape_kinds.SPHERE).any() else 0
     now = Motions.blank(ns)
     now.radius[bounded.sum() :] = np.inf
     return Search(
@@ -199,7 +197,7 @@ def narrow_phase_kernel(G: Geometry) -> Kernel:
     from .narrow_phase.dispatch import kernel_for_kinds, no_pair_contacts
 
     kind, bounded = G.shape.kind[:], np.isfinite(bounding_volumes(G).radius)
-    simple = (kind == SPHERE) | (~bounded & (kind == PLANE))
+    simple = (kind == shape_kinds.SPHERE) | (~bounded & (kind == shape_kinds.PLANE))
     return no_pair_contacts if simple.all() else kernel_for_kinds(set(kind.tolist()))
 
 
@@ -242,7 +240,7 @@ class ContactFinder:
         self.search.count.narrow_phase = narrow_phase_kernel(geometry).address
         self.address = search.address
 
-    def find(self, movers: Movers, rebuild: bool = False) -> Contacts:
+    def find(self, movers: Movers, rebuild: bool = False) -> ContactTable:
         """Find the contacts at these poses; writes them to ``now``, and the old ``now`` becomes ``before``.
 
         Parameters
@@ -322,7 +320,7 @@ class ContactFinder:
         return int(B.slot.shape_index[many.argmax()]), int(many.max())
 
 
-def _enlarged_contacts(C: Contacts, capacity: int) -> Contacts:
+def _enlarged_contacts(C: ContactTable, capacity: int) -> ContactTable:
     """Copy contacts to a larger table."""
     out = no_contacts(capacity)
     n = min(len(C.at), capacity)

@@ -4,7 +4,7 @@
 
     status = call(address, G, M, C, O, B, STEP)      # structures are passed by pointer: see `compiler.struct_layout`
 
-`search` updates the list of pairs (`broad_phase/pair_list`), then computes the contacts of every listed pair:
+`search` updates the list of pairs (`broad_phase`), then computes the contacts of every listed pair:
 spheres and planes directly, other pairs by the narrow phase. A fast pair is advanced along its motion to the place
 where it first touches (conservative advancement: Mirtich 1996, "Impulse-based dynamic simulation of rigid body
 systems", 2.3), because the nearest points of distant shapes are not those where they will touch.
@@ -22,8 +22,9 @@ from ..compiler.formulas import call, formula
 from ..compiler.kernels import kernel
 from ..math.scalar import cos, sin, sqrt
 from ..math.vec import add, dot, load3, load9, mm, norm, quaternion_matrix, scale, store3, store9, sub
-from .broad_phase.cell_grid import sort_shapes
-from .broad_phase.envelopes import (
+from .broad_phase import drop_moved, list_all, list_moved, renew_envelope, sort_shapes
+from .contact_matching import clear_table, matching_contact, store_all_pairs
+from .envelopes import (
     advance_frame,
     bounds_meet,
     half_extent,
@@ -32,23 +33,19 @@ from .broad_phase.envelopes import (
     update_slots,
     velocity_at_point,
 )
-from .broad_phase.pair_list import drop_moved, list_all, list_moved, renew_envelope
-from .broad_phase.workspace import (
-    GENERIC_PAIR,
-    IS_PLANE,
-    SPHERE_PLANE,
-    SPHERE_SPHERE,
-    Search,
-)
-from .contact_matching import clear_table, matching_contact, store_all_pairs
 from .tables import (
     DONE,
     FULL_CONTACTS,
     FULL_PAIRS,
+    GENERIC_PAIR,
+    IS_PLANE,
     NOT_FINITE,
-    Contacts,
+    SPHERE_PLANE,
+    SPHERE_SPHERE,
+    ContactTable,
     Geometry,
     Movers,
+    Search,
 )
 
 
@@ -504,7 +501,7 @@ def find_contacts(G, M, C, O, B, task):
 
 
 @kernel
-def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
+def search(G: Geometry, M: Movers, C: ContactTable, O: ContactTable, B: Search, task: int) -> int:
     """Find contacts at the movers' poses. Returns a status (DONE, FULL_*, NOT_FINITE), also in ``C.count.status``."""
     C.count.status = find_contacts(G, M, C, O, B, task)
     C.count.rebuilt = B.count.rebuilds

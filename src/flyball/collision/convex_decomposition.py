@@ -85,7 +85,7 @@ EDGE_SEARCH_VERTICES = 40  # number of vertices above which the farthest one is 
 
 
 @dataclass(frozen=True, eq=False)
-class Hull:
+class ConvexPolyhedron:
     """A convex polyhedron: vertices (k, 3) [m], outward unit normals (m, 3), and corners of each side.
 
     Corners are vertex numbers, counter-clockwise seen from outside.
@@ -140,7 +140,7 @@ class Hull:
         return [*ends, *starts, *lists]
 
 
-def convex_hull(points: Any) -> Hull:
+def convex_hull(points: Any) -> ConvexPolyhedron:
     """Compute the convex hull of points (k, 3) [m].
 
     Raises
@@ -171,7 +171,7 @@ def convex_hull(points: Any) -> Hull:
     new = np.full(len(scaled), -1)
     new[used] = np.arange(len(used))
     renamed = tuple(tuple(int(new[k]) for k in s) for s in sides)
-    return Hull(x[found.vertices][used], normals, renamed)
+    return ConvexPolyhedron(x[found.vertices][used], normals, renamed)
 
 
 def _merged_faces(found: Any, points: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
@@ -228,7 +228,7 @@ class ConvexParts:
         Largest thickness [m] of empty space in a part in front of the solid's surface, along its normal.
     """
 
-    hulls: tuple[Hull, ...]
+    hulls: tuple[ConvexPolyhedron, ...]
     beyond: float
 
 
@@ -238,7 +238,7 @@ class _Piece:
 
     triangles: np.ndarray
     planes: np.ndarray
-    hull: Hull | None = None
+    hull: ConvexPolyhedron | None = None
     empty: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -309,7 +309,7 @@ def _update_hull(piece: _Piece, size: float, more: np.ndarray) -> None:
         piece.empty[some] = _exit_distance(piece.hull, points, n[some], ON_PLANE * size)
 
 
-def _exit_distance(body: Hull, points: np.ndarray, n: np.ndarray, thick: float) -> np.ndarray:
+def _exit_distance(body: ConvexPolyhedron, points: np.ndarray, n: np.ndarray, thick: float) -> np.ndarray:
     """Distance (m,) from points (m, 4, 3) to the surface of a convex body along n (m, 3), largest of the four."""
     gap = np.maximum(body.offsets - points @ body.normals.T, 0.0)
     gap[gap < thick] = 0.0

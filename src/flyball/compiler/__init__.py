@@ -4,7 +4,7 @@
 `@kernel`, for entry points with C's calling convention, buffers of their arguments, and code tables of formulas that
 are called by address. `struct_layout` reads layouts of arguments from annotations. `numba_target` translates functions
 to LLVM text, with the types of `numba_types`; `object_code` links and optimises a kernel as a whole, which takes a
-fifth of the time of one function after the other. `object_files` finds and stores the code, `announcements` says how
+fifth of the time of one function after the other. `object_files` finds and stores the code and says how
 long a compilation takes, and `ahead_of_time` compiles every kernel.
 
 Imports NumPy and `errors` only; Numba and llvmlite are imported inside functions, Numba only where something must be

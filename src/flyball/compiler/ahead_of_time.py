@@ -16,11 +16,10 @@ from subprocess import PIPE
 from threading import Lock
 from typing import TextIO
 
-from .announcements import COSTS, DEFAULT_COST
 from .formulas import KERNELS, PACKAGE, compiled_files
 from .kernels import Kernel
 from .object_code import baseline, compile_kernel
-from .object_files import cache_folder, file_name, read_object, write_object
+from .object_files import COSTS, DEFAULT_COST, cache_folder, file_name, read_object, write_object
 
 _DECORATED = re.compile(r"^@(first_order_)?kernel$", re.MULTILINE)
 # Child processes find modules where this process does, and leave interrupts to it.

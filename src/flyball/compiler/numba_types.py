@@ -32,7 +32,7 @@ INTEGER = ir.IntType(64)
 
 def reference(layout: Struct | Array | RecordLayout) -> Any:
     """Numba's type of a structure or of an array that a kernel takes by address."""
-    return Structure(layout) if isinstance(layout, Struct) else Reference(layout)
+    return StructureType(layout) if isinstance(layout, Struct) else Reference(layout)
 
 
 def load_members(builder: Any, address: Any, skipped: int = 0) -> Any:
@@ -145,7 +145,7 @@ class _Part(NamedTuple):
         return builder.add(flat, flat.type(self.first))
 
 
-class Structure(types.Type):
+class StructureType(types.Type):
     """Type of a structure passed by address."""
 
     def __init__(self, layout: Struct) -> None:
@@ -153,27 +153,27 @@ class Structure(types.Type):
         super().__init__(name=f"{layout.of.__module__}.{layout}")
 
 
-@register_model(Structure)
+@register_model(StructureType)
 class StructureModel(models.OpaqueModel):
     """Data model: an address."""
 
 
 @infer_getattr
 class _StructureFields(AttributeTemplate):  # type: ignore[misc]
-    key = Structure
+    key = StructureType
 
     def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
         return reference(typ.of[attr]) if attr in typ.of else None
 
 
-@lower_getattr_generic(Structure)
+@lower_getattr_generic(StructureType)
 def _field_address(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
     return builder.gep(value, [INTEGER(typ.layout.offset(name))], inbounds=True)
 
 
 @type_callable(by_address)
 def _type_by_address(context):  # type: ignore[no-untyped-def]
-    return lambda fields: Structure(_layout_of(fields))
+    return lambda fields: StructureType(_layout_of(fields))
 
 
 # not an overload, which would be a function of its own whose memory is gone when it returns

@@ -128,7 +128,7 @@ class JointController(Controller):
 
     def derived(self, name: str, wiring: Any) -> SyntaxNode | None:
         """Return a derivative of a reference, or the effort "model_k" by the robot's model."""
-        from ..expression_graph.joint_efforts import ACCELERATION, POSITION, RATE, joint_efforts, time_derivative
+        from ..expression_graph.tracing import ACCELERATION, POSITION, RATE, joint_efforts, time_derivative
 
         what, _, k = name.rpartition("_")
         if what in DERIVATIVES:

@@ -1,8 +1,8 @@
 """Derivatives of the equations of motion at a state, their reduction to independent coordinates, and eigenvalues.
 
 Statics, linear models, sensitivities and implicit integration use this package. The state is (q, v, z) with the
-controller states z; `force_balance` has their natural sizes, and the rounding of every equation. The package imports
-the engine, tables, assembly, mobility and results. Derivatives are taken by complex steps through the compiled
+controller states z; `equation_derivatives` has their natural sizes, and the rounding of every equation. The package
+imports the engine, tables, assembly, mobility and results. Derivatives are taken by complex steps through the compiled
 formulas, so a new element type needs no code here.
 
 Velocities that affect no common equation share a complex step: a dozen evaluations suffice for a thousand bodies.

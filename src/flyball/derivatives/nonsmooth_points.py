@@ -24,8 +24,7 @@ from ..model.element import LawOf, fields_with
 from ..model.expressions import Expression
 from ..model.force import CoordinateForce
 from ..model.model import Model
-from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative
-from .force_balance import state_sizes
+from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative, state_sizes
 from .output_derivatives import curve_gradients, snapshot
 
 OFFSET = 1e-6  # relative to the mechanism's length or a radian, or to these times its characteristic rate

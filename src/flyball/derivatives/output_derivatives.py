@@ -19,7 +19,7 @@ from ..engine.kinematics import retract
 from ..errors import ModelError
 from ..mobility.mobility import mobility
 from ..mobility.null_spaces import CHANGE_TOLERANCE, scaled_jacobian
-from ..numerics.sparse_rank import null_spaces
+from ..numerics.rank import null_spaces
 from ..results.health import Health
 from ..results.mobility import Mobility
 from ..results.result import Result

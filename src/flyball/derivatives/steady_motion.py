@@ -19,12 +19,19 @@ from ..engine.kinematics import coordinate_rates, normalise_quaternions, quatern
 from ..errors import AnalysisError
 from ..laws.bytecode import INPUT
 from ..numerics.rank import fundamental_subspaces
-from ..results.recorded_kinematics import RecordedMotion
+from ..results.motion_record import RecordedMotion
 from ..results.wording import tuple_text
 from ..tables.structure_definition import velocity_names
 from ..tables.table_definitions import System
-from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState, complex_step_derivative
-from .force_balance import force_magnitudes, residual_rounding, state_sizes
+from .equation_derivatives import (
+    COMPLEX_STEP,
+    EquationDerivatives,
+    MechanismState,
+    complex_step_derivative,
+    force_magnitudes,
+    residual_rounding,
+    state_sizes,
+)
 from .reduced_equations import (
     FreeCoordinates,
     TurningFrame,

@@ -31,8 +31,8 @@ from ..numerics.integrators.time_loop import (
     finish_step,
     no_segment_start,
 )
+from ..numerics.rank import largest_singular_value, smallest_singular_values
 from ..numerics.sparse_factorisation import ldl_factor
-from ..numerics.sparse_rank import largest_singular_value, smallest_singular_values
 from ..tables.law_inputs import force_reading_count
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (

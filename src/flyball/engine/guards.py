@@ -3,7 +3,7 @@
 A guard is a number whose zero crossing is an event:
 
     a user's event expression      its value
-    a switch                       a formula of `constraints.switches.guard_kinds`
+    a switch                       a formula of `constraints.switches.switch_kind`
     a nonsmooth point of a law     direction * u; while the motion is held on u = 0: 1 - |direction|
     a contact point                see `contact_guard`
 
@@ -25,7 +25,8 @@ import numpy as np
 from ..compiler.formulas import call, dispatch_by_kind, formula
 from ..compiler.kernels import kernel
 from ..compiler.struct_layout import Float1, Float2, Int1
-from ..constraints.switches.guard_kinds import (
+from ..constraints.switches.switch_kind import (
+    DISC,
     G_BACK,
     G_CONE,
     G_CORNER,
@@ -40,12 +41,12 @@ from ..constraints.switches.guard_kinds import (
     G_TURNS,
     G_UPPER,
     GUARDS,
+    INTERVAL,
     OFF,
     POSITION_ROUNDING,
     STATIC,
     significant_rate,
 )
-from ..constraints.switches.switch_kind import DISC, INTERVAL
 from ..laws.bytecode import BY_TIME, SENSOR, evaluate, evaluate_jet
 from ..math.scalar import magnitude, sqrt
 from ..numerics.complementarity.interior_point import (

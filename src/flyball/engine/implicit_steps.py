@@ -13,7 +13,7 @@ import numpy as np
 from ..compiler.formulas import call, formula
 from ..compiler.kernels import kernel
 from ..compiler.struct_layout import Float1, Int1, Int2
-from ..constraints.switches.guard_kinds import STEADY
+from ..constraints.switches.switch_kind import STEADY
 from ..math.rotation import cayley_rate
 from ..numerics.integrators.implicit_method import restore_start_rates, run_implicit_task
 from ..numerics.integrators.implicit_workspace import STEP_START, RadauStepWorkspace

@@ -19,7 +19,7 @@ import numpy as np
 from ..compiler.formulas import formula
 from ..compiler.kernels import ArrayBuffer, BoundKernel, JoinedBuffer, PooledBuffer, StructBuffer, StructPool, kernel
 from ..compiler.struct_layout import Array, Float2, Int1
-from ..constraints.switches.guard_kinds import DISTANCE_GUARDS, FORCE_GUARDS, G_BACK, G_SHARED, G_TURNS, RATE_GUARDS
+from ..constraints.switches.switch_kind import DISTANCE_GUARDS, FORCE_GUARDS, G_BACK, G_SHARED, G_TURNS, RATE_GUARDS
 from ..numerics.complementarity.interior_point import UNKNOWN_COUNT
 from ..numerics.event_location.event_steps import finish_step_with_events, start_event_segment
 from ..numerics.event_location.guards import (

@@ -18,7 +18,7 @@ Forces that events or laws name are written to their columns once accelerations 
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from ..constraints.switches.guard_kinds import BY_RATE, G_CONE, G_EDGE, OFF, STATIC
+from ..constraints.switches.switch_kind import BY_RATE, G_CONE, G_EDGE, OFF, STATIC
 from ..forces.joint_friction import load as pressed
 from ..laws.bytecode import evaluate
 from ..math.scalar import exp, magnitude, sign, sqrt

@@ -18,7 +18,7 @@ halved, so that no step leads to another branch. Rows are written at all step ti
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from ..constraints.switches.guard_kinds import OFF, STEADY
+from ..constraints.switches.switch_kind import OFF, STEADY
 from ..laws.bytecode import STACK_RESERVE, evaluate_jet, is_entire
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..numerics.integrators.time_loop import DONE, RUNNING, STEP_FAILED, TOO_MANY_STEPS

@@ -89,7 +89,7 @@ def inertial_terms(S, W, vdot, out):
 def residual_terms(S, W, t, vdot, lam, out):
     """Write the terms of r; kinematics, rows and loads are known. Returns their number.
 
-    The order is that of `simulation/implicit/jacobian_pattern.py`: bodies; of each force between frames the side of M,
+    The order is that of `simulation/jacobian_pattern.py`: bodies; of each force between frames the side of M,
     then that of F; rows; forces along measured quantities.
     """
     at = inertial_terms(S, W, vdot, out)

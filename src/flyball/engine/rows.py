@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..constraints.registry import BY_ADDRESS
-from ..constraints.switches.guard_kinds import OFF, STEADY
+from ..constraints.switches.switch_kind import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub

@@ -1,6 +1,6 @@
 """Expressions as a kind of number: one graph in which equal expressions are one node.
 
-`graph` defines the nodes, `evaluation` computes values and derivatives, `tracing` runs the engine's formulas on
+`graph` defines the nodes and computes values and derivatives, `tracing` runs the engine's formulas on
 expressions, `simplification` finds short forms, `printers` write languages. The formulas of elements run on nodes as on
 floats. Imports `math`, `laws`, `tables` and the engine; a new printer is one file in `printers`.
 

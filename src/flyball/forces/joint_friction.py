@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 KIND = 6
 TURN = 6.283185307179586  # rad
-SLIDING = 1.5  # sliding directions are -1, 0 and 1; `guard_kinds.STATIC` is larger, and selects the static friction
+SLIDING = 1.5  # sliding directions are -1, 0 and 1; `switch_kind.STATIC` is larger, and selects the static friction
 FALLS, CREEPS = 10, 11  # parameters that are 1 if a Stribeck speed, a stick speed is given; else 0
 STICKING = 3.0  # times the stick speed: slower sliding counts as sticking (the law is then within 0.5 % of full)
 FALL = 0.01  # m/s: Stribeck speed of the regularised law

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..compiler.formulas import formula
 from ..constraints.switches.elastic_stop import ELASTIC
-from ..constraints.switches.guard_kinds import FROZEN
 from ..constraints.switches.stop import STOP
+from ..constraints.switches.switch_kind import FROZEN
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
@@ -25,7 +25,7 @@ KIND = 8
 def effort(par, x, rate, laws, load):
     """Effort along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above upper.
 
-    A side without a stop has k = c = 0. While a side is fixed (`guard_kinds.FROZEN`), its formula is continued
+    A side without a stop has k = c = 0. While a side is fixed (`switch_kind.FROZEN`), its formula is continued
     smoothly beyond the corner.
     """
     o = 0.0 * x

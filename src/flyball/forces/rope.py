@@ -13,8 +13,8 @@ from pydantic import BeforeValidator
 from ..compiler.formulas import formula
 from ..constraints.blocks import DISTANCE, Row
 from ..constraints.switches.elastic_stop import ELASTIC
-from ..constraints.switches.guard_kinds import FROZEN
 from ..constraints.switches.stop import STOP
+from ..constraints.switches.switch_kind import FROZEN
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
@@ -31,7 +31,7 @@ KIND = 2
 def effort(par, x, rate, laws, load):
     """Return the effort along the rope's length x: -max(0, k (x - x_0) + c rate) if longer than x_0, else zero.
 
-    While its state is fixed as taut or slack (`guard_kinds.FROZEN`), the formula is continued smoothly beyond the
+    While its state is fixed as taut or slack (`switch_kind.FROZEN`), the formula is continued smoothly beyond the
     corner.
     """
     o = 0.0 * x

@@ -6,8 +6,7 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from ..constraints.switches.guard_kinds import G_HOLDS
-from ..constraints.switches.switch_kind import INTERVAL, Instant, ProblemRow, SwitchKind
+from ..constraints.switches.switch_kind import G_HOLDS, INTERVAL, Instant, ProblemRow, SwitchKind
 from ..model.element import Number, Unit, element, positive
 from ..model.force import Switch, Unilateral, check_same_kind
 from ..numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE

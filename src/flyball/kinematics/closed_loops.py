@@ -36,7 +36,7 @@ OFF_CONSTRAINTS = 1e-6
 """Violation of the constraints, in lengths of the mechanism or radians, from which on a state is refused."""
 
 
-class Constraints(NamedTuple):
+class ConstraintRows(NamedTuple):
     """Constraint rows at k states."""
 
     jacobian: Array  # (k, nr, nv)
@@ -46,7 +46,7 @@ class Constraints(NamedTuple):
 class LoopEquations(NamedTuple):
     """M a = right + G^T lam, G a = gamma at k states."""
 
-    rows: Constraints
+    rows: ConstraintRows
     M: Array  # (k, nv, nv)
     L: Array  # (k, nv, nv): M = L L^T
     G: Array  # (k, nr, nv): rows of unit length
@@ -94,7 +94,7 @@ class ClosedLoops:
     bias_forces: Callable[[Array, Array], Array]
     closed_nearby: Callable[[], Array]
 
-    def constraints(self, q: Array, v: Array) -> Constraints:
+    def constraints(self, q: Array, v: Array) -> ConstraintRows:
         """Constraint rows at states (k, nq), (k, nv).
 
         Raises
@@ -104,7 +104,7 @@ class ClosedLoops:
         """
         arrays = self.rows_at(q, v)
         self._refuse_inconsistent(arrays, v)
-        return Constraints(arrays.jacobian, arrays.gamma)
+        return ConstraintRows(arrays.jacobian, arrays.gamma)
 
     def rows_at(self, q: Array, v: Array) -> ConstraintArrays:
         """Constraint rows at any states, whether or not they satisfy them."""
@@ -144,7 +144,7 @@ class ClosedLoops:
                 f"state {i} violates the constraints of {self._name!r}: {self.rows[row]!r} is off by "
                 f"{arrays.value[i, row]:.3g}. Recursive dynamics with closed loops needs states that satisfy them"
             )
-        G, _ = self._unit_rows(Constraints(arrays.jacobian, arrays.gamma))
+        G, _ = self._unit_rows(ConstraintRows(arrays.jacobian, arrays.gamma))
         drift = np.abs((G @ v[..., None])[..., 0]).max(axis=1, initial=0.0)
         wrong = drift > OFF_CONSTRAINTS * np.abs(v).max(axis=1, initial=0.0)
         if wrong.any():
@@ -158,7 +158,7 @@ class ClosedLoops:
         return self.dynamics.structure.model.name
 
     @staticmethod
-    def _unit_rows(rows: Constraints) -> tuple[Array, Array]:
+    def _unit_rows(rows: ConstraintRows) -> tuple[Array, Array]:
         """Rows divided by their norms, and the norms; rows that are zero but for rounding are zero, with norm 1."""
         norms = np.linalg.norm(rows.jacobian, axis=2, keepdims=True)
         zero = norms <= RANK * norms.max(axis=1, keepdims=True, initial=0.0)
@@ -250,7 +250,7 @@ class ClosedLoops:
 
     def _ranks(self, q: Array, tolerance: float) -> Array:
         rows = self.rows_at(q, np.zeros((len(q), len(self.names))))
-        G, _ = self._unit_rows(Constraints(rows.jacobian, rows.gamma))
+        G, _ = self._unit_rows(ConstraintRows(rows.jacobian, rows.gamma))
         return np.asarray((self._relative_singular_values(G) > tolerance).sum(axis=1))
 
     def _refuse_singular(self, G: Array) -> None:
@@ -317,7 +317,7 @@ class ClosedLoops:
         c = inverse[..., f:] @ (rows.gamma / norms)[..., None]
         return inverse[..., :f], c[..., 0]
 
-    def _with_rows(self, rows: Constraints, names: Sequence[str]) -> tuple[Array, Array, Array]:
+    def _with_rows(self, rows: ConstraintRows, names: Sequence[str]) -> tuple[Array, Array, Array]:
         """Rows that select velocities, above the constraint rows of unit length; these rows, and their norms.
 
         Raises

@@ -130,7 +130,7 @@ PROGRAMS = {
 }
 
 
-class State(NamedTuple):
+class ConvertedState(NamedTuple):
     """Coordinates (k, nq), and velocities and accelerations (k, nv) as far as they are given."""
 
     q: Array
@@ -140,15 +140,15 @@ class State(NamedTuple):
 class Part(Protocol):
     """Coordinates and velocities that are converted together."""
 
-    def from_flyball(self, ours: State, theirs: State) -> None:
+    def from_flyball(self, ours: ConvertedState, theirs: ConvertedState) -> None:
         """Write theirs."""
 
-    def to_flyball(self, theirs: State, ours: State) -> None:
+    def to_flyball(self, theirs: ConvertedState, ours: ConvertedState) -> None:
         """Write ours."""
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class ConvertedCoordinate:
     """A coordinate that is one number in both programs, or cosine and sine in the other."""
 
     q: int
@@ -158,7 +158,7 @@ class Coordinate:
     offset: float  # theirs less ours
     on_circle: bool
 
-    def from_flyball(self, ours: State, theirs: State) -> None:
+    def from_flyball(self, ours: ConvertedState, theirs: ConvertedState) -> None:
         """Write theirs."""
         x = ours.q[:, self.q] + self.offset
         for k, part in enumerate((np.cos(x), np.sin(x)) if self.on_circle else (x,)):
@@ -166,7 +166,7 @@ class Coordinate:
         for a, b in zip(ours.motion, theirs.motion, strict=True):
             b[:, self.theirs_v] = a[:, self.v]
 
-    def to_flyball(self, theirs: State, ours: State) -> None:
+    def to_flyball(self, theirs: ConvertedState, ours: ConvertedState) -> None:
         """Write ours."""
         x = theirs.q[:, self.theirs_q]
         ours.q[:, self.q] = (np.arctan2(theirs.q[:, self.theirs_q + 1], x) if self.on_circle else x) - self.offset
@@ -185,7 +185,7 @@ class Ball:
     axes: Array  # (3, 3): of the outer body's reference frame, in the moved axes of the joint here
     scalar_last: bool
 
-    def from_flyball(self, ours: State, theirs: State) -> None:
+    def from_flyball(self, ours: ConvertedState, theirs: ConvertedState) -> None:
         """Write theirs."""
         e = _unit(ours.q[:, self.q : self.q + 4])
         e[:, 1:] = e[:, 1:] @ self.axes
@@ -193,7 +193,7 @@ class Ball:
         for a, b in zip(ours.motion, theirs.motion, strict=True):
             b[:, self.theirs_v : self.theirs_v + 3] = a[:, self.v : self.v + 3] @ self.axes
 
-    def to_flyball(self, theirs: State, ours: State) -> None:
+    def to_flyball(self, theirs: ConvertedState, ours: ConvertedState) -> None:
         """Write ours."""
         e = _scalar_first(theirs.q[:, self.theirs_q : self.theirs_q + 4], self.scalar_last)
         e[:, 1:] = e[:, 1:] @ self.axes.T
@@ -214,7 +214,7 @@ class FreeBody:
     F: Array  # (3, 3)
     theirs: FreeBodyConvention
 
-    def from_flyball(self, ours: State, theirs: State) -> None:
+    def from_flyball(self, ours: ConvertedState, theirs: ConvertedState) -> None:
         """Write theirs."""
         c, e = ours.q[:, self.q : self.q + 3], _unit(ours.q[:, self.q + 3 : self.q + 7])
         A = _matrix(e)
@@ -234,7 +234,7 @@ class FreeBody:
             self._velocity(x, self.theirs.linear)[...] = shift
             self._velocity(x, self.theirs.angular)[...] = turn
 
-    def to_flyball(self, theirs: State, ours: State) -> None:
+    def to_flyball(self, theirs: ConvertedState, ours: ConvertedState) -> None:
         """Write ours."""
         given = _scalar_first(self._place(theirs.q, self.theirs.quaternion, 4), self.theirs.scalar_last)
         e = _product(given, quaternion_of(self.F.T))
@@ -302,8 +302,8 @@ class Convention:
         x = self._dynamics
         given, k = self._rows(x.structure.nq, q, v, a)
         refuse_zero_quaternions(given[0], x.quaternions, x.names)
-        ours = State(given[0], given[1:])
-        theirs = State(np.zeros((len(given[0]), self.nq)), [np.zeros_like(x) for x in ours.motion])
+        ours = ConvertedState(given[0], given[1:])
+        theirs = ConvertedState(np.zeros((len(given[0]), self.nq)), [np.zeros_like(x) for x in ours.motion])
         for part in self._parts:
             part.from_flyball(ours, theirs)
         return _one_or_many((theirs.q, *theirs.motion), k)
@@ -314,8 +314,10 @@ class Convention:
         An angle that they store as cosine and sine comes back between -pi and pi.
         """
         given, k = self._rows(self.nq, q, v, a)
-        theirs = State(given[0], given[1:])
-        ours = State(np.zeros((len(given[0]), self._dynamics.structure.nq)), [np.zeros_like(x) for x in theirs.motion])
+        theirs = ConvertedState(given[0], given[1:])
+        ours = ConvertedState(
+            np.zeros((len(given[0]), self._dynamics.structure.nq)), [np.zeros_like(x) for x in theirs.motion]
+        )
         for part in self._parts:
             part.to_flyball(theirs, ours)
         return _one_or_many((ours.q, *ours.motion), k)
@@ -393,7 +395,7 @@ def _part(x: BatchDynamics, b: int, at: tuple[int, int, int, int], owner: str, p
         frame = x.frame(owner)
         return FreeBody(*at, frame.position, frame.rotation.reshape(3, 3), theirs)
     if kind != SPHERICAL:
-        return Coordinate(*at, float(x.system.bodies.offset[b]), on_circle)
+        return ConvertedCoordinate(*at, float(x.system.bodies.offset[b]), on_circle)
     outer = [name for name, row in x.structure.place.items() if row == b]
     if program == "drake" or not outer:
         raise ModelError(f"{owner!r} turns freely about a point: {program} has no joint with these coordinates")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
@@ -24,7 +24,7 @@ from ..mobility.null_spaces import jacobian_rank, scaled_jacobian
 from ..model.body import Driver
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_unsupported
-from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE
+from ..numerics.rank import MAX_DOUBTFUL_SVD_SIZE
 from ..progress import no_progress, progress_bar
 from ..results.mobility import Mobility
 from ..results.result import Result
@@ -42,7 +42,7 @@ Times = int | Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class KinematicsOptions(Options):
+class KinematicsOptions(AnalysisOptions):
     """Arguments of `Mechanism.kinematics`."""
 
     times: Times

@@ -29,10 +29,9 @@ from ..model.joint import Coupling
 from ..model.model import Model, listing, suggest
 from ..model.table import Table
 from ..model.unsupported_elements import refuse_unsupported
-from ..numerics.rank import fundamental_subspaces
-from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, rank_by_pivots
+from ..numerics.rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, fundamental_subspaces, rank_by_pivots
 from ..results.inverse_dynamics import Drive, InverseDynamics
-from ..results.recorded_kinematics import RecordedMotion
+from ..results.motion_record import RecordedMotion
 from ..results.result import Result
 from ..simulation.prescribed_motion import is_checked_afterwards
 from ..tables.table_definitions import PLANAR, POINT

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.entry_point import MOTION
@@ -26,7 +26,7 @@ from ..laws.bytecode import evaluate_jet
 from ..laws.python_functions import function_fault
 from ..model.model import Model
 from ..model.unsupported_elements import acts_while_sliding, refuse_unsupported
-from ..results.recorded_kinematics import FULL_TURN
+from ..results.motion_record import FULL_TURN
 from ..results.result import Result
 from ..simulation.initial_state import InitialState, find_initial_state
 from ..tables.structure_definition import velocity_names
@@ -383,7 +383,7 @@ class Prepared(RecursiveMethods):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrepareOptions(Options):
+class PrepareOptions(AnalysisOptions):
     """Arguments of `Mechanism.prepare`."""
 
     coordinates: str

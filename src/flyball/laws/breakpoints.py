@@ -18,7 +18,7 @@ from .interval_evaluation import (
     CONSTANT_IN_TIME,
     STATE_DEPENDENT,
     TIME_ONLY,
-    Corner,
+    CornerLevels,
     IntervalLaw,
     Signs,
     Step,
@@ -49,7 +49,7 @@ class Spans(NamedTuple):
         return {k: s[part] for k, s in self.signs.items()}
 
 
-def level_crossings(law: IntervalLaw, c: Corner, spans: Spans) -> tuple[np.ndarray, bool]:
+def level_crossings(law: IntervalLaw, c: CornerLevels, spans: Spans) -> tuple[np.ndarray, bool]:
     """Times within the spans at which a corner's levels are reached, ascending, and whether these are all.
 
     Levels that are only touched count where the corner states it.
@@ -93,7 +93,7 @@ def level_crossings(law: IntervalLaw, c: Corner, spans: Spans) -> tuple[np.ndarr
     return _distinct_times(times, thin if c.touched else 0.0, spans.edges), complete and all_of_them
 
 
-def _at_ends(law: IntervalLaw, requested: list[int], c: Corner, spans: Spans) -> np.ndarray:
+def _at_ends(law: IntervalLaw, requested: list[int], c: CornerLevels, spans: Spans) -> np.ndarray:
     """Time beside an end of the span where a level is reached at the end itself, within rounding."""
     ends = spans.edges[[0, -1]]
     near = END_MARGIN * np.spacing(np.abs(ends).max())
@@ -112,7 +112,7 @@ def _nearer(middle: Any, width: np.ndarray, f: Range, slope: Range) -> Range:
     return np.broadcast_to(lo, width.shape), np.broadcast_to(hi, width.shape)
 
 
-def _roundoff(law: IntervalLaw, c: Corner, found: Mapping[int, Any], n: int) -> np.ndarray:
+def _roundoff(law: IntervalLaw, c: CornerLevels, found: Mapping[int, Any], n: int) -> np.ndarray:
     """Rounding error of a difference, from its operands: a level less deep inside counts as not reached."""
     s = law.steps[c.of]
     if c.touched or s.operation not in (ADD, SUBTRACT):
@@ -123,13 +123,13 @@ def _roundoff(law: IntervalLaw, c: Corner, found: Mapping[int, Any], n: int) -> 
 
 
 def _zero_ends(
-    law: IntervalLaw, requested: list[int], c: Corner, t: Range, signs: Signs, blur: np.ndarray
+    law: IntervalLaw, requested: list[int], c: CornerLevels, t: Range, signs: Signs, blur: np.ndarray
 ) -> list[np.ndarray]:
     """Ends, where the difference is zero, of intervals that rounding leaves undecided: it may have a sign beyond."""
     return [x[np.abs(law.points(requested, x, signs)[0][c.of]) <= blur] for x in t]
 
 
-def _levels(c: Corner, x: Any, before: bool = False) -> np.ndarray:
+def _levels(c: CornerLevels, x: Any, before: bool = False) -> np.ndarray:
     """Number of levels up to x; ``before``: excluding x itself."""
     side: Literal["left", "right"] = "left" if before else "right"
     if c.period == 0.0:
@@ -140,7 +140,7 @@ def _levels(c: Corner, x: Any, before: bool = False) -> np.ndarray:
     return len(c.levels) * turns + np.searchsorted(np.r_[c.levels, c.levels[0] + c.period], rest, side=side)
 
 
-def _level(c: Corner, n: np.ndarray) -> np.ndarray:
+def _level(c: CornerLevels, n: np.ndarray) -> np.ndarray:
     """Level number n, counted as `_levels` does."""
     if c.period == 0.0:
         return c.levels[n.astype(int)]
@@ -154,7 +154,7 @@ def _subdivide(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> tuple[np.ndarr
     return x[:, :-1].ravel(), x[:, 1:].ravel(), np.repeat(part, SUBDIVISION)
 
 
-def _zeros(law: IntervalLaw, requested: list[int], c: Corner, t: Range, signs: Signs) -> tuple[np.ndarray, bool]:
+def _zeros(law: IntervalLaw, requested: list[int], c: CornerLevels, t: Range, signs: Signs) -> tuple[np.ndarray, bool]:
     """Times at which levels are crossed in intervals in which a step is monotonic, and whether these are all."""
     if not len(t[0]):
         return t[0], True
@@ -417,7 +417,7 @@ def sign_changes(
         return NO_TIMES, np.zeros(0, bool), True
     law, spans, complete = _split_at_corners(steps, const, t0, t1)
     with np.errstate(all="ignore"):
-        zeros, all_found = level_crossings(law, Corner(-1, len(steps) - 1, np.zeros(1)), spans)
+        zeros, all_found = level_crossings(law, CornerLevels(-1, len(steps) - 1, np.zeros(1)), spans)
         edges = np.unique(np.r_[spans.edges, zeros])
         t = interior_times(edges)
         positive = np.broadcast_to(law.points(range(len(steps)), t)[0][len(steps) - 1], t.shape) > 0.0
@@ -461,7 +461,7 @@ def _split_at_corners(steps: list[Step], const: np.ndarray, t0: float, t1: float
     """The law, time divided at its corners (inner ones first), and whether all are found."""
     law = IntervalLaw(steps, const)
     spans = Spans(np.array([t0, t1], float), {})
-    known: list[Corner] = []
+    known: list[CornerLevels] = []
     complete = True
     with np.errstate(all="ignore"):
         for c in find_corners(steps, const):

@@ -239,23 +239,12 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
                 f, f1, f2 = spline(const, operand, v)
                 if f - f != 0.0 and v - v == 0.0:
                     missed, beyond = operand, v
-            elif operation == CALL:
-                f = function_value(operand, v)
-                f1, f2 = function_slopes(operand, v, f)
             else:
-                f = integer_power(v, operand)
-                f1, f2 = integer_power_slopes(v, operand)
+                f, f1, f2 = function_jet(operation, operand, v)
             store_chain(stack, top, f, f1, f2)
-        elif operation == WHERE:
+        elif operation == WHERE or operation == BLEND:
             top -= 2
-            yes = stack[top, 0] - 0.5
-            for k in range(3):
-                stack[top, k] = choose(yes, stack[top + 1, k], stack[top + 2, k])
-        elif operation == BLEND:
-            top -= 2
-            way = stack[top, 0]
-            for k in range(3):
-                stack[top, k] = blend_branches(way, stack[top + 1, k], stack[top + 2, k])
+            select_jet(operation, stack, top)
         elif operation == FREEZE:
             store_row(stack, top, stack[top, 0], 0.0, 0.0)
         elif operation == FUNCTION:  # its derivatives are not known
@@ -267,6 +256,29 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
     if missed >= 0 and stack[0, 0] - stack[0, 0] != 0.0:
         record_out_of_range(stack, at, missed, beyond, t)
     return stack[0, 0], stack[0, 1], stack[0, 2]
+
+
+@formula
+def function_jet(operation, operand, v):
+    """Value, first and second derivative of a function or of a whole power at v."""
+    if operation == CALL:
+        f = function_value(operand, v)
+        f1, f2 = function_slopes(operand, v, f)
+    else:
+        f = integer_power(v, operand)
+        f1, f2 = integer_power_slopes(v, operand)
+    return f, f1, f2
+
+
+@formula
+def select_jet(operation, stack, top):
+    """Replace the condition in row `top` by the branch that it selects, of the two in the next rows."""
+    way = stack[top, 0]
+    for k in range(3):
+        if operation == WHERE:
+            stack[top, k] = choose(way - 0.5, stack[top + 1, k], stack[top + 2, k])
+        else:
+            stack[top, k] = blend_branches(way, stack[top + 1, k], stack[top + 2, k])
 
 
 @formula

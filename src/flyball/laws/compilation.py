@@ -26,31 +26,7 @@ from typing import Any
 from ..errors import ExpressionError
 from ..model.expression_parser import DEFINED, DEFINITIONS, FunctionCall, SyntaxNode, call_node
 from ..model.expressions import Expression, fold_constants
-from .bytecode import (
-    ADD,
-    ATAN2,
-    BLEND,
-    CALL,
-    CONSTANT,
-    COPY,
-    DIVIDE,
-    FREEZE,
-    FUNCTION,
-    INPUT,
-    KEEP,
-    LESS,
-    LESS_EQUAL,
-    MAXIMUM,
-    MINIMUM,
-    MULTIPLY,
-    NEGATE,
-    POWER,
-    SENSOR,
-    SUBTRACT,
-    TABLE,
-    WHERE,
-    WHOLE_POWER,
-)
+from . import bytecode
 from .python_functions import CalledFunction, compile_function
 
 SIDE, BETWEEN_SIDES = "side", "between sides"
@@ -332,10 +308,24 @@ def _new_node(like: SyntaxNode, kind: str, *args: SyntaxNode, value: float | Non
 
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
-_UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
+_UNARY = {name: bytecode.NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
 _BINARY = {
-    **{"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "**": POWER, "atan2": ATAN2},
-    **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
+    **{
+        "+": bytecode.ADD,
+        "-": bytecode.SUBTRACT,
+        "*": bytecode.MULTIPLY,
+        "/": bytecode.DIVIDE,
+        "**": bytecode.POWER,
+        "atan2": bytecode.ATAN2,
+    },
+    **{
+        "min": bytecode.MINIMUM,
+        "max": bytecode.MAXIMUM,
+        "<": bytecode.LESS,
+        "<=": bytecode.LESS_EQUAL,
+        "and": bytecode.MINIMUM,
+        "or": bytecode.MAXIMUM,
+    },
 }
 SEARCHED_CONSTANTS = 64  # constants among which a literal is searched
 _NONE: Mapping[str, int] = MappingProxyType({})
@@ -392,16 +382,9 @@ def compile_law(
     if not inputs or inputs[0] != "t" or len(const) < len(parameters):
         raise ValueError("the first input is 't', and const starts with one value for each parameter")
     _refuse_ambiguous_names(expression, inputs, parameters, sensors)
-    known = [*inputs, *sensors, *parameters]
-    expression.require(known)
-    expression.require_tables(tables)
-    if derivatives:
-        expression.require_derivatives()
-    tree = expression.tree
-    if expression.function is not None:
-        tree = call_node(tree, known, expression.text, expression.where)
+    tree = _required_tree(expression, [*inputs, *sensors, *parameters], tables, derivatives)
     tree = _with_code(tree, code, functions)
-    writer = _Writer(expression, inputs, parameters, const, sensors, tables)
+    writer = _ProgramWriter(expression, inputs, parameters, const, sensors, tables)
     tree = _folded(expression, tree, writer.varying)
     if derivatives:
         tree = _single_powers(tree, writer.varying)
@@ -409,6 +392,17 @@ def compile_law(
         tree = on_one_side(tree, frozenset((*inputs[1:], *sensors)), corners)
     writer.write(tree)
     return writer.append(code)
+
+
+def _required_tree(expression: Expression, known: Sequence[str], tables: Mapping[str, int], derivatives: bool) -> Any:
+    """Tree of a law whose names, tables and derivatives exist; a Python function is a call with all names."""
+    expression.require(known)
+    expression.require_tables(tables)
+    if derivatives:
+        expression.require_derivatives()
+    if expression.function is None:
+        return expression.tree
+    return call_node(expression.tree, known, expression.text, expression.where)
 
 
 def compile_decision(
@@ -421,7 +415,7 @@ def compile_decision(
     tables: Mapping[str, int],
 ) -> tuple[int, int]:
     """Append the program of a corner's deciding expression, of time and sensors, as `compile_law` does."""
-    writer = _Writer(law, ("t",), parameters, const, sensors, tables)
+    writer = _ProgramWriter(law, ("t",), parameters, const, sensors, tables)
     writer.write(tree)
     return writer.append(code)
 
@@ -532,7 +526,7 @@ def _function(request: FunctionCall, code: list[int], functions: list[CalledFunc
     return len(code) - 3
 
 
-class _Writer:
+class _ProgramWriter:
     """Writer of the program of one law."""
 
     def __init__(
@@ -545,8 +539,8 @@ class _Writer:
         tables: Mapping[str, int],
     ) -> None:
         self.expression = expression
-        self.varying = {name: (INPUT, k) for k, name in enumerate(inputs)}
-        self.varying |= {name: (SENSOR, k) for name, k in sensors.items()}
+        self.varying = {name: (bytecode.INPUT, k) for k, name in enumerate(inputs)}
+        self.varying |= {name: (bytecode.SENSOR, k) for name, k in sensors.items()}
         self.parameters = {name: k for k, name in enumerate(parameters)}
         self.const = const
         self.tables = tables
@@ -563,21 +557,21 @@ class _Writer:
         """Write a node after its arguments; `frozen`: a constant part around it is already marked."""
         constant = frozen or _constant(node, self.varying)
         if node.kind == "number":
-            return self.emit(CONSTANT, self.slot(float(node.value)), 1)
+            return self.emit(bytecode.CONSTANT, self.slot(float(node.value)), 1)
         if node.kind == SIDE:
-            return self.emit(SENSOR, node.value, 1)
+            return self.emit(bytecode.SENSOR, node.value, 1)
         if node.kind == DEFINITIONS:
             return self.write_definitions(node)
         if node.kind == DEFINED:
-            return self.emit(COPY, self.defined[node.value], 1)
+            return self.emit(bytecode.COPY, self.defined[node.value], 1)
         if node.kind == "name" and node.value in self.varying:
             return self.emit(*self.varying[node.value], 1)
         if node.kind == "name":
-            return self.emit(CONSTANT, self.parameters[node.value], 1)
+            return self.emit(bytecode.CONSTANT, self.parameters[node.value], 1)
         self.write_operation(node, constant)
         if constant and not frozen:
             # Parts without an input or a sensor have no derivatives, even where a function's own slope is infinite.
-            self.emit(FREEZE, 0, 0)
+            self.emit(bytecode.FREEZE, 0, 0)
 
     def write_definitions(self, node: SyntaxNode) -> None:
         around, self.defined = self.defined, []
@@ -586,7 +580,7 @@ class _Writer:
             self.write(definition)
             self.defined.append(self.depth - 1)
         self.write(body)
-        self.emit(KEEP, len(definitions), -len(definitions))
+        self.emit(bytecode.KEEP, len(definitions), -len(definitions))
         self.defined = around
 
     def write_operation(self, node: SyntaxNode, constant: bool) -> None:
@@ -594,17 +588,17 @@ class _Writer:
             if not (node.kind == "**" and arg is node.args[1] and is_small_integer(arg)):
                 self.write(arg, constant)
         if node.kind == "**" and is_small_integer(node.args[1]):
-            self.emit(WHOLE_POWER, int(node.args[1].value), 0)
+            self.emit(bytecode.WHOLE_POWER, int(node.args[1].value), 0)
         elif node.kind in _UNARY:
-            self.emit(CALL, _UNARY[node.kind], 0)
+            self.emit(bytecode.CALL, _UNARY[node.kind], 0)
         elif node.kind == "table":
-            self.emit(TABLE, self.tables[node.value], 0)
+            self.emit(bytecode.TABLE, self.tables[node.value], 0)
         elif node.kind == "function":
-            self.emit(FUNCTION, node.value, 1 - len(node.args))
+            self.emit(bytecode.FUNCTION, node.value, 1 - len(node.args))
         elif node.kind == "where":
-            self.emit(WHERE, 0, -2)
+            self.emit(bytecode.WHERE, 0, -2)
         elif node.kind == BETWEEN_SIDES:
-            self.emit(BLEND, 0, -2)
+            self.emit(bytecode.BLEND, 0, -2)
         else:
             for _ in node.args[1:]:
                 self.emit(_BINARY[node.kind], 0, -1)

@@ -10,48 +10,8 @@ import numpy as np
 
 from ..math.scalar import choose, integer_power
 from ..math.spline import BREAKS, PIECE, spline
-from .bytecode import (
-    ABS,
-    ACOS,
-    ADD,
-    ASIN,
-    ATAN2,
-    BLEND,
-    CALL,
-    CONSTANT,
-    COPY,
-    COS,
-    COUNT,
-    DIVIDE,
-    FREEZE,
-    FUNCTION,
-    INPUT,
-    KEEP,
-    LESS,
-    LESS_EQUAL,
-    LOG,
-    LOW_DEGREE,
-    MAXIMUM,
-    MINIMUM,
-    MULTIPLY,
-    NEGATE,
-    NOT,
-    POWER,
-    SENSOR,
-    SIGN,
-    SIN,
-    SQRT,
-    SUBTRACT,
-    TABLE,
-    TAN,
-    WHERE,
-    WHOLE_POWER,
-    blend_branches,
-    combine_values,
-    function_slopes,
-    function_value,
-    power_slopes,
-)
+from . import bytecode
+from .bytecode import blend_branches, combine_values, function_slopes, function_value, power_slopes
 from .interval_arithmetic import (
     Range,
     TableRanges,
@@ -80,7 +40,7 @@ class Step(NamedTuple):
     logical: bool = False
 
 
-class Corner(NamedTuple):
+class CornerLevels(NamedTuple):
     """Corner: step ``at`` has a corner or jumps where step ``of`` reaches one of ``levels`` (repeated with ``period``).
 
     ``touched``: also where the argument only touches the level.
@@ -110,23 +70,23 @@ def read_steps(code: Sequence[int] | np.ndarray, at: int) -> list[Step]:
 
     for i in range(at + 2, at + 2 + 2 * int(code[at]), 2):
         operation, operand = int(code[i]), int(code[i + 1])
-        if operation == COPY:
+        if operation == bytecode.COPY:
             stack.append(stack[operand])
             continue
-        if operation == KEEP:
+        if operation == bytecode.KEEP:
             del stack[len(stack) - 1 - operand : len(stack) - 1]
             continue
-        if operation in (CONSTANT, INPUT, SENSOR):
+        if operation in (bytecode.CONSTANT, bytecode.INPUT, bytecode.SENSOR):
             on = (
                 CONSTANT_IN_TIME
-                if operation == CONSTANT
+                if operation == bytecode.CONSTANT
                 else TIME_ONLY
-                if operation == INPUT and operand == 0
+                if operation == bytecode.INPUT and operand == 0
                 else STATE_DEPENDENT
             )
             stack.append(place(Step(operation, operand, (), on)))
         else:
-            count = int(code[operand + COUNT]) if operation == FUNCTION else _operand_count(operation)
+            count = int(code[operand + bytecode.COUNT]) if operation == bytecode.FUNCTION else _operand_count(operation)
             args = tuple(stack[len(stack) - count :])
             del stack[len(stack) - count :]
             *difference, on_arguments = _on(out, operation, operand, args)
@@ -138,25 +98,25 @@ def read_steps(code: Sequence[int] | np.ndarray, at: int) -> list[Step]:
 
 
 def _operand_count(operation: int) -> int:
-    return 3 if operation in (WHERE, BLEND) else 2 if operation >= ADD else 1
+    return 3 if operation in (bytecode.WHERE, bytecode.BLEND) else 2 if operation >= bytecode.ADD else 1
 
 
 def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...]) -> list[Step]:
     """A step; before a comparison, a step for the deciding difference is added."""
-    on = STATE_DEPENDENT if operation == FUNCTION else max(before[k].on for k in args)
-    logical = operation == CALL and operand == NOT
-    if operation in (LESS, LESS_EQUAL, MINIMUM, MAXIMUM):
-        logical = operation in (LESS, LESS_EQUAL) or before[args[0]].logical
-        if operation in (LESS, LESS_EQUAL) or not logical:
-            a, b = args if operation in (MINIMUM, MAXIMUM) else args[::-1]
-            difference = Step(SUBTRACT, 0, (a, b), on)
+    on = STATE_DEPENDENT if operation == bytecode.FUNCTION else max(before[k].on for k in args)
+    logical = operation == bytecode.CALL and operand == bytecode.NOT
+    if operation in (bytecode.LESS, bytecode.LESS_EQUAL, bytecode.MINIMUM, bytecode.MAXIMUM):
+        logical = operation in (bytecode.LESS, bytecode.LESS_EQUAL) or before[args[0]].logical
+        if operation in (bytecode.LESS, bytecode.LESS_EQUAL) or not logical:
+            a, b = args if operation in (bytecode.MINIMUM, bytecode.MAXIMUM) else args[::-1]
+            difference = Step(bytecode.SUBTRACT, 0, (a, b), on)
             return [difference, Step(operation, operand, (*args, len(before)), on, logical)]
     return [Step(operation, operand, args, on, logical)]
 
 
 def takes_arrays(code: np.ndarray, at: int) -> bool:
     """Whether the law that starts at ``at`` can be evaluated on arrays: it calls no Python function."""
-    return not (_operations(code, at) == FUNCTION).any()
+    return not (_operations(code, at) == bytecode.FUNCTION).any()
 
 
 def evaluate_over_time(
@@ -178,7 +138,7 @@ def evaluate_over_time(
     """
     steps, out = read_steps(code, at), np.empty(x[0].shape)
     values, sides = sensed
-    corners = (_operations(code, at) == BLEND).any()
+    corners = (_operations(code, at) == bytecode.BLEND).any()
     for some in _equal_branches(sides, len(out)) if corners else (slice(None),):
         row = [*values[:, some], *(sides[:, some][:, 0] if corners else sides)]
         with np.errstate(all="ignore"):
@@ -191,24 +151,24 @@ def _values_of_steps(steps: list[Step], const: np.ndarray, x: Sequence[Any], sen
     v: list[Any] = []
     for operation, operand, args, *_ in steps:
         a = [v[k] for k in args]
-        if operation == CONSTANT:
+        if operation == bytecode.CONSTANT:
             v.append(const[operand])
-        elif operation == INPUT:
+        elif operation == bytecode.INPUT:
             v.append(x[operand])
-        elif operation == SENSOR:
+        elif operation == bytecode.SENSOR:
             v.append(sensed[operand])
-        elif operation == CALL:
+        elif operation == bytecode.CALL:
             v.append(function_value(operand, a[0]))
-        elif operation == WHOLE_POWER:
+        elif operation == bytecode.WHOLE_POWER:
             v.append(integer_power(a[0], operand))
-        elif operation == TABLE:
+        elif operation == bytecode.TABLE:
             v.append(spline(const, operand, a[0])[0])
-        elif operation == WHERE:
+        elif operation == bytecode.WHERE:
             v.append(choose(a[0] - 0.5, a[1], a[2]))
-        elif operation == BLEND:
+        elif operation == bytecode.BLEND:
             v.append(blend_branches(*a))
         else:
-            v.append(a[0] if operation == FREEZE else combine_values(operation, a[0], a[1]))
+            v.append(a[0] if operation == bytecode.FREEZE else combine_values(operation, a[0], a[1]))
     return v[-1]
 
 
@@ -235,13 +195,17 @@ def _part(const: np.ndarray, some: slice | np.ndarray) -> np.ndarray:
 
 def step_may_be_brief(step: Step, steps: Sequence[Step]) -> bool:
     """Whether a step can change much within a short time or distance: see `bytecode.may_be_brief`."""
-    if step.operation == CALL:
-        return step.operand not in (SIN, COS, NEGATE)
-    if step.operation == WHOLE_POWER:
-        return not 0 <= step.operand <= LOW_DEGREE
-    if step.operation == DIVIDE:
+    if step.operation == bytecode.CALL:
+        return step.operand not in (bytecode.SIN, bytecode.COS, bytecode.NEGATE)
+    if step.operation == bytecode.WHOLE_POWER:
+        return not 0 <= step.operand <= bytecode.LOW_DEGREE
+    if step.operation == bytecode.DIVIDE:
         return steps[step.args[1]].on != CONSTANT_IN_TIME
-    return not (step.operation <= SENSOR or step.operation in (FREEZE, BLEND) or ADD <= step.operation <= MULTIPLY)
+    return not (
+        step.operation <= bytecode.SENSOR
+        or step.operation in (bytecode.FREEZE, bytecode.BLEND)
+        or bytecode.ADD <= step.operation <= bytecode.MULTIPLY
+    )
 
 
 def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
@@ -253,29 +217,32 @@ def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
     return sorted(found)
 
 
-def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
+def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[CornerLevels]:
     """Find where steps of time alone may have corners, jumps, or ends of their domain; inner ones first."""
     out = []
     zero = np.zeros(1)
     for k, s in enumerate(steps):
         if s.on != TIME_ONLY:
             continue
-        if s.operation == CALL and s.operand in (SIGN, ABS, LOG):
-            out.append(Corner(k, s.args[0], zero))
-        elif (s.operation == CALL and s.operand == SQRT) or s.operation == POWER:
-            out.append(Corner(k, s.args[0], zero, touched=True))
-        elif s.operation == CALL and s.operand in (ASIN, ACOS):
-            out.append(Corner(k, s.args[0], np.array([-1.0, 1.0]), touched=True))
-        elif s.operation == CALL and s.operand == TAN:
-            out.append(Corner(k, s.args[0], np.array([0.5 * np.pi]), np.pi))
-        elif s.operation in (DIVIDE, ATAN2) and steps[s.args[s.operation == DIVIDE]].on == TIME_ONLY:
-            out.append(Corner(k, s.args[s.operation == DIVIDE], zero))
-        elif s.operation == WHOLE_POWER and s.operand < 0:
-            out.append(Corner(k, s.args[0], zero))
-        elif s.operation == TABLE and len(levels := table_corners(const, s.operand)):
-            out.append(Corner(k, s.args[0], levels, float(const[s.operand])))
-        elif len(s.args) == 3 and s.operation not in (WHERE, BLEND):
-            out.append(Corner(k, s.args[2], zero))
+        if s.operation == bytecode.CALL and s.operand in (bytecode.SIGN, bytecode.ABS, bytecode.LOG):
+            out.append(CornerLevels(k, s.args[0], zero))
+        elif (s.operation == bytecode.CALL and s.operand == bytecode.SQRT) or s.operation == bytecode.POWER:
+            out.append(CornerLevels(k, s.args[0], zero, touched=True))
+        elif s.operation == bytecode.CALL and s.operand in (bytecode.ASIN, bytecode.ACOS):
+            out.append(CornerLevels(k, s.args[0], np.array([-1.0, 1.0]), touched=True))
+        elif s.operation == bytecode.CALL and s.operand == bytecode.TAN:
+            out.append(CornerLevels(k, s.args[0], np.array([0.5 * np.pi]), np.pi))
+        elif (
+            s.operation in (bytecode.DIVIDE, bytecode.ATAN2)
+            and steps[s.args[s.operation == bytecode.DIVIDE]].on == TIME_ONLY
+        ):
+            out.append(CornerLevels(k, s.args[s.operation == bytecode.DIVIDE], zero))
+        elif s.operation == bytecode.WHOLE_POWER and s.operand < 0:
+            out.append(CornerLevels(k, s.args[0], zero))
+        elif s.operation == bytecode.TABLE and len(levels := table_corners(const, s.operand)):
+            out.append(CornerLevels(k, s.args[0], levels, float(const[s.operand])))
+        elif len(s.args) == 3 and s.operation not in (bytecode.WHERE, bytecode.BLEND):
+            out.append(CornerLevels(k, s.args[2], zero))
     return out
 
 
@@ -309,7 +276,7 @@ class IntervalLaw:
 
     def __init__(self, steps: Sequence[Step], const: np.ndarray) -> None:
         self.steps, self.const = steps, np.asarray(const, float)
-        self.curves = {s.operand: TableRanges(self.const, s.operand) for s in steps if s.operation == TABLE}
+        self.curves = {s.operand: TableRanges(self.const, s.operand) for s in steps if s.operation == bytecode.TABLE}
         self.fixed: dict[int, float] = {}  # values of constant steps
         for k, s in enumerate(steps):
             if s.on == CONSTANT_IN_TIME:
@@ -333,46 +300,46 @@ class IntervalLaw:
 
     def _point(self, s: Step, v: Mapping[int, Any], t: np.ndarray) -> Any:
         a = [v[k] for k in s.args]
-        if s.operation == CONSTANT:
+        if s.operation == bytecode.CONSTANT:
             return self.const[s.operand]
-        if s.operation == INPUT:
+        if s.operation == bytecode.INPUT:
             return t
-        if s.operation == CALL:
+        if s.operation == bytecode.CALL:
             return function_value(s.operand, a[0])
-        if s.operation == WHOLE_POWER:
+        if s.operation == bytecode.WHOLE_POWER:
             return integer_power(a[0], s.operand)
-        if s.operation == TABLE:
+        if s.operation == bytecode.TABLE:
             return spline(self.const, s.operand, a[0])[0]
-        if s.operation == WHERE:
+        if s.operation == bytecode.WHERE:
             return np.where(np.asarray(a[0]) > 0.5, a[1], a[2])
-        return a[0] if s.operation == FREEZE else np.asarray(combine_values(s.operation, a[0], a[1]))
+        return a[0] if s.operation == bytecode.FREEZE else np.asarray(combine_values(s.operation, a[0], a[1]))
 
     def _slope(self, s: Step, v: Mapping[int, Any], d: Mapping[int, Any], f: Any) -> Any:
         a, b = [v[k] for k in s.args], [d[k] for k in s.args]
         o = s.operation
-        if o == INPUT:
+        if o == bytecode.INPUT:
             return 1.0
-        if o == CALL:
+        if o == bytecode.CALL:
             return function_slopes(s.operand, a[0], f)[0] * b[0]
-        if o == WHOLE_POWER:
+        if o == bytecode.WHOLE_POWER:
             return power_slopes(a[0], s.operand)[0] * b[0]
-        if o == TABLE:
+        if o == bytecode.TABLE:
             return spline(self.const, s.operand, a[0])[1] * b[0]
-        if o == WHERE:
+        if o == bytecode.WHERE:
             return np.where(np.asarray(a[0]) > 0.5, b[1], b[2])
-        if o in (ADD, SUBTRACT):
-            return b[0] + b[1] if o == ADD else b[0] - b[1]
-        if o == MULTIPLY:
+        if o in (bytecode.ADD, bytecode.SUBTRACT):
+            return b[0] + b[1] if o == bytecode.ADD else b[0] - b[1]
+        if o == bytecode.MULTIPLY:
             return b[0] * a[1] + a[0] * b[1]
-        if o == DIVIDE:
+        if o == bytecode.DIVIDE:
             return (b[0] - f * b[1]) / a[1]
-        if o == POWER:
+        if o == bytecode.POWER:
             return power_slopes(a[0], a[1])[0] * b[0]
-        if o == ATAN2:
+        if o == bytecode.ATAN2:
             return (a[1] * b[0] - a[0] * b[1]) / (a[0] * a[0] + a[1] * a[1])
-        if o in (MINIMUM, MAXIMUM) and len(a) == 3:
-            return np.where(np.asarray(a[2]) > 0.0, b[o == MINIMUM], b[o == MAXIMUM])
-        return b[0] if o == FREEZE else 0.0
+        if o in (bytecode.MINIMUM, bytecode.MAXIMUM) and len(a) == 3:
+            return np.where(np.asarray(a[2]) > 0.0, b[o == bytecode.MINIMUM], b[o == bytecode.MAXIMUM])
+        return b[0] if o == bytecode.FREEZE else 0.0
 
     def enclose(self, requested: Sequence[int], t: Range, signs: Signs) -> dict[int, JetRange]:
         """Ranges of steps and of their slopes over intervals of time.
@@ -384,7 +351,7 @@ class IntervalLaw:
             s = self.steps[k]
             if s.on == CONSTANT_IN_TIME:
                 out[k] = (self.fixed[k], self.fixed[k]), ZERO_RANGE
-            elif s.operation == INPUT:
+            elif s.operation == bytecode.INPUT:
                 out[k] = t, (1.0, 1.0)
             else:
                 out[k] = self._range(s, [out[n] for n in s.args], signs.get(k))
@@ -393,36 +360,36 @@ class IntervalLaw:
     def _range(self, s: Step, a: list[JetRange], sign: Any) -> JetRange:
         o = s.operation
         f, d = a[0]
-        if o == FREEZE:
+        if o == bytecode.FREEZE:
             return f, d
-        if o == TABLE:
+        if o == bytecode.TABLE:
             g, slope = self.curves[s.operand].ranges(f)
             return g, range_product(slope, d)
-        if o == WHOLE_POWER:
+        if o == bytecode.WHOLE_POWER:
             n = s.operand
             slope = range_product((float(n), float(n)), integer_power_range(f, n - 1)) if n != 0 else ZERO_RANGE
             return integer_power_range(f, n), range_product(slope, d)
-        if o == CALL:
+        if o == bytecode.CALL:
             return _function_on_side(s.operand, f, d, sign)
-        if o == WHERE:
+        if o == bytecode.WHERE:
             yes, no = f[0] > 0.5, f[1] < 0.5
             return _condition_range(yes, no, a[1][0], a[2][0]), _condition_range(yes, no, a[1][1], a[2][1])
-        if o in (LESS, LESS_EQUAL):
+        if o in (bytecode.LESS, bytecode.LESS_EQUAL):
             return ((0.0, 1.0) if sign is None else (np.where(sign > 0, 1.0, 0.0),) * 2), ZERO_RANGE
-        if o in (MINIMUM, MAXIMUM):
+        if o in (bytecode.MINIMUM, bytecode.MAXIMUM):
             return _extreme(o, a, sign)
         return _arithmetic(o, a, sign)
 
 
 def _on_side(s: Step, a: list[Any], sign: Any) -> Any:
     """Value of a step with a corner, on the side given by a sign; None where that makes no difference."""
-    if s.operation == CALL and s.operand in (ABS, SIGN):
-        return sign * a[0] if s.operand == ABS else sign
-    if s.operation in (LESS, LESS_EQUAL):
+    if s.operation == bytecode.CALL and s.operand in (bytecode.ABS, bytecode.SIGN):
+        return sign * a[0] if s.operand == bytecode.ABS else sign
+    if s.operation in (bytecode.LESS, bytecode.LESS_EQUAL):
         return np.where(sign > 0, 1.0, 0.0)
-    if s.operation in (MINIMUM, MAXIMUM):
-        return np.where((sign > 0) == (s.operation == MAXIMUM), a[0], a[1])
-    if s.operation == ATAN2:
+    if s.operation in (bytecode.MINIMUM, bytecode.MAXIMUM):
+        return np.where((sign > 0) == (s.operation == bytecode.MAXIMUM), a[0], a[1])
+    if s.operation == bytecode.ATAN2:
         return np.arctan2(np.where(a[0] * sign <= 0.0, np.copysign(0.0, sign), a[0]), a[1])
     return None
 
@@ -434,13 +401,13 @@ def _condition_range(yes: Any, no: Any, a: Range, b: Range) -> Range:
 
 
 def _function_on_side(number: int, f: Range, d: Range, sign: Any) -> JetRange:
-    if number in (ABS, SIGN) and sign is not None:
+    if number in (bytecode.ABS, bytecode.SIGN) and sign is not None:
         s = (sign, sign)
-        if number == SIGN:
+        if number == bytecode.SIGN:
             return s, ZERO_RANGE
         lo, hi = range_product(s, f)
         return (np.maximum(lo, 0.0), hi), range_product(s, d)
-    if number == NOT:
+    if number == bytecode.NOT:
         return (1.0 - f[1], 1.0 - f[0]), ZERO_RANGE
     g, slope = function_ranges(number, f)
     return g, range_product(slope, d)
@@ -448,31 +415,31 @@ def _function_on_side(number: int, f: Range, d: Range, sign: Any) -> JetRange:
 
 def _extreme(o: int, a: list[JetRange], sign: Any) -> JetRange:
     """Minimum or maximum of two; of truth values, whether both or one holds."""
-    pick = np.minimum if o == MINIMUM else np.maximum
+    pick = np.minimum if o == bytecode.MINIMUM else np.maximum
     (f, d), (g, e) = a[0], a[1]
     if len(a) == 2 or sign is None:
         return (pick(f[0], g[0]), pick(f[1], g[1])), range_hull([*d, *e])
-    first = (sign > 0) == (o == MAXIMUM)
+    first = (sign > 0) == (o == bytecode.MAXIMUM)
     return _condition_range(first, ~first, f, g), _condition_range(first, ~first, d, e)
 
 
 def _arithmetic(o: int, a: list[JetRange], sign: Any) -> JetRange:
     (f, d), (g, e) = a[0], a[1]
-    if o == ADD:
+    if o == bytecode.ADD:
         return range_sum(f, g), range_sum(d, e)
-    if o == SUBTRACT:
+    if o == bytecode.SUBTRACT:
         return range_difference(f, g), range_difference(d, e)
-    if o == MULTIPLY:
+    if o == bytecode.MULTIPLY:
         return range_product(f, g), range_sum(range_product(d, g), range_product(f, e))
-    if o == DIVIDE:
+    if o == bytecode.DIVIDE:
         if sign is not None:
             g = np.where(sign > 0, np.maximum(g[0], 0.0), g[0]), np.where(sign > 0, g[1], np.minimum(g[1], 0.0))
         q = range_product(f, range_reciprocal(g))
         return q, range_product(range_difference(d, range_product(q, e)), range_reciprocal(g))
-    if o == POWER:
+    if o == bytecode.POWER:
         p, slope = real_power_ranges(f, g[0])
         return p, range_product(slope, d)
-    if o == ATAN2:
+    if o == bytecode.ATAN2:
         if sign is not None:
             up, down = (sign > 0) & (f[0] <= 0.0), (sign < 0) & (f[1] >= 0.0)
             f = np.where(up, 0.0, f[0]), np.where(down, -0.0, f[1])

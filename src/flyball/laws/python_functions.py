@@ -243,7 +243,7 @@ def _frozen(value: Any) -> Any:
 def _same(a: Any, b: Any) -> bool:
     try:
         return bool(a == b)
-    except Exception:  # objects that cannot be compared
+    except Exception:  # the comparison of the user's objects may raise anything
         return False
 
 

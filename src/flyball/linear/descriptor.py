@@ -47,7 +47,7 @@ from ..errors import AnalysisError, SingularityError
 from ..mobility.null_spaces import scaled_jacobian
 from ..model.element_laws import Input
 from ..numerics.eigen import QuadraticPencil
-from ..numerics.sparse_rank import weak_pivots
+from ..numerics.rank import weak_pivots
 from ..results.linear_model import Descriptor
 from ..tables.structure_definition import velocity_names
 from ..tables.values import Values

@@ -1,6 +1,6 @@
 """Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
 
-With inputs that move the mechanism (drivers, lengths) the reduced equations (see `linear_reduction`) contain rates of
+With inputs that move the mechanism (drivers, lengths) the reduced equations (see `reduced_equations`) contain rates of
 inputs, which a change of state eliminates.
 """
 
@@ -12,21 +12,22 @@ from functools import partial
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import state_sizes
-from ..derivatives.linear_reduction import InputTerms, ReducedEquations, state_names
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, state_sizes
 from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.reduced_equations import (
     FreeCoordinates,
+    InputTerms,
     MatrixUncertainty,
+    ReducedEquations,
     TurningFrame,
     free_coordinates,
     reduced_equations,
     refuse_singular_position,
+    state_names,
 )
 from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
 from ..errors import ModelError
@@ -37,8 +38,8 @@ from ..model.model import Model
 from ..model.quantities import ENERGY, single_quantity
 from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
-from ..results.linear_model import Descriptor, LinearModel, StateSpace
-from ..results.phases import CUMULATIVE_ENERGIES
+from ..results.events import CUMULATIVE_ENERGIES
+from ..results.linear_model import Descriptor, LinearModel, StateSpaceForm
 from ..results.result import Result
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..statics.stability import stability_by_eigenvalues
@@ -61,7 +62,7 @@ FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts 
 
 
 @dataclass(frozen=True, kw_only=True)
-class OperatingPointOptions(Options):
+class OperatingPointOptions(AnalysisOptions):
     """Options for the operating point of an analysis of small motions."""
 
     about: Result | Equilibrium | None
@@ -188,7 +189,7 @@ def _reduced_linear_model(x: MechanismState, o: LinearizeOptions, named: list[In
     return _linear_model(e, named, o.outputs, space, partial(dense_descriptor, e, f, frame, named, o.outputs), frame)
 
 
-def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpace:
+def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpaceForm:
     """Dense state space of a large mechanism, computed only when needed."""
     x, named = _with_inputs(o.state(model), o.inputs)
     return _reduced_linear_model(x, o, named).dense
@@ -312,10 +313,10 @@ def _eigenvalues(A: np.ndarray, uncertainty: MatrixUncertainty | None) -> np.nda
 
 def _state_space(
     e: EquationDerivatives, f: FreeCoordinates, r: ReducedEquations, inputs: list[Input], outputs: Sequence[str]
-) -> StateSpace:
+) -> StateSpaceForm:
     A, B, C, D = _matrices(r, _output_matrix(e, r, inputs, outputs), inputs, outputs)
     states, units = state_names(f.names, f, [x.name for x in e.state.c.structure.controls])
-    return StateSpace(
+    return StateSpaceForm(
         A=A,
         B=B,
         C=C,
@@ -334,7 +335,7 @@ def _linear_model(
     e: EquationDerivatives,
     inputs: list[Input],
     outputs: Sequence[str],
-    dense: StateSpace | Callable[[], StateSpace],
+    dense: StateSpaceForm | Callable[[], StateSpaceForm],
     sparse: Descriptor | Callable[[], Descriptor],
     frame: TurningFrame | None,
     period: float | None = None,

@@ -15,8 +15,7 @@ import numpy as np
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
-from ..constraints.switches.guard_kinds import OFF
-from ..constraints.switches.switch_kind import NO_ROW
+from ..constraints.switches.switch_kind import NO_ROW, OFF
 from ..derivatives.equation_derivatives import MechanismState
 from ..errors import AnalysisError, ModelError, SingularityError
 from ..model.element import Element

@@ -18,7 +18,7 @@ import numpy as np
 from ..derivatives.eigenvalues import Spectrum, spectrum
 from ..derivatives.reduced_equations import MatrixUncertainty
 from ..errors import ModelError
-from ..results.linear_model import StateSpace
+from ..results.linear_model import StateSpaceForm
 
 PERIOD_TOLERANCE = 1e-9  # relative deviation allowed from a common period
 MAX_INSTANTS = 10_000  # largest denominator of a ratio of periods, and largest number of instants in a cycle
@@ -108,8 +108,8 @@ def refuse_unsettled(
 
 
 def cycle_equations(
-    space: StateSpace, samples: Sequence[SampledSignal], outputs: int
-) -> tuple[StateSpace, Spectrum, float]:
+    space: StateSpaceForm, samples: Sequence[SampledSignal], outputs: int
+) -> tuple[StateSpaceForm, Spectrum, float]:
     """Difference equations over one cycle, their eigenvalues (multipliers), and the length of the cycle [s].
 
     The state is that just before the first instant of the cycle; outputs and inputs are those just after it. See
@@ -146,7 +146,7 @@ def _update_groups(due: list[SampledSignal]) -> Iterator[list[SampledSignal]]:
     yield [s for s in due if not s.signal]
 
 
-def _advanced_by_exponential(space: StateSpace, h: float, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+def _advanced_by_exponential(space: StateSpaceForm, h: float, X: np.ndarray, U: np.ndarray) -> np.ndarray:
     """Advance the state by a time ``h`` with constant inputs."""
     from scipy.linalg import expm
 

@@ -19,8 +19,15 @@ from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.kinematics import load_record
 from ..engine.rows import row_parameters
 from ..math.vec import neg, scale
-from ..numerics.rank import column_space, fundamental_subspaces, null_space
-from ..numerics.sparse_rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, sparse_matrix_rank, sparse_null_space
+from ..numerics.rank import (
+    MAX_DOUBTFUL_SVD_SIZE,
+    MAX_SVD_SIZE,
+    column_space,
+    fundamental_subspaces,
+    null_space,
+    sparse_matrix_rank,
+    sparse_null_space,
+)
 from ..tables.values import Values
 
 
@@ -35,7 +42,7 @@ class ConstraintNullSpaces:
 
     @property
     def velocities(self) -> np.ndarray:
-        """Velocities (nv, f) that the rows allow; as many as `ROOM` (in `numerics.sparse_rank`) allows."""
+        """Velocities (nv, f) that the rows allow; as many as `ROOM` (in `numerics.rank`) allows."""
         if self.allowed_velocities is not None:
             return self.allowed_velocities
         a = self.assembly

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError
-from .sparse_rank import null_basis, saddle_point_solver
+from .rank import null_basis, saddle_point_solver
 
 BREAKDOWN_TOLERANCE = 1e-10  # relative norm of the new direction below which the Krylov space counts as invariant
 

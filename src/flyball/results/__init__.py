@@ -6,6 +6,6 @@ inside functions. ``results/part_views`` holds what a result says of one part: o
 A new result class has ``lines()``, ``as_dict()`` and, where there is something to draw, ``plot()``.
 
 Quantities are computed by the elements' formulas on arrays over time, so that no second implementation can differ.
-Between events results keep modes, directions and tables of each phase (`phases`). `diagnostics` judges a motion by its
+Between events results keep modes, directions and tables of each phase (`events`). `diagnostics` judges a motion by its
 energy, accelerations and turning; every figure is relative to the terms that cancel in it.
 """

@@ -32,7 +32,7 @@ from ..numerics.integrators.radau_stages import RADAU_A as RADAU
 from ..tables.law_inputs import forces_in_events
 from ..tables.structure_definition import velocity_names
 from .energy_balance import EnergyBudget, budgets_by_part, lag_warning
-from .recorded_kinematics import coordinate_records, measured_coordinate
+from .motion_record import coordinate_records, measured_coordinate
 
 if TYPE_CHECKING:
     from ..model.model import Model

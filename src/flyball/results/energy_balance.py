@@ -21,8 +21,8 @@ from ..model.force import Force
 from ..model.quantities import ENERGY, Quantity, quantities
 from ..numerics.graphs import find_root, unite
 from ..tables.table_definitions import BETWEEN, SLIDING, System
+from .events import EVENT_WORK, stored_by_events, stored_reference
 from .part_views.base import NamedQuantities
-from .phases import EVENT_WORK, stored_by_events, stored_reference
 
 if TYPE_CHECKING:
     from .result import Result

@@ -28,13 +28,12 @@ import numpy as np
 from ..model.output_files import TABLE, replacing_file, write_file
 from ..model.quantities import ENERGY, quantities
 from ..tables.values import Values, values
-from .body_sets import SET_MEMBER_ARRAYS, BodySetMotion
-from .body_sets import SET_MOTION_ARRAYS as OVER_TIME
 from .contacts import CONTACT_COLUMNS, ContactBodies, Contacts, Convergence
-from .events import EventRecord
+from .events import EventRecord, Phase, phases_or_none
+from .part_views.bodies import SET_MEMBER_ARRAYS, BodySetMotion
+from .part_views.bodies import SET_MOTION_ARRAYS as OVER_TIME
 from .part_views.forces import ForceView
 from .part_views.joints import JointView
-from .phases import Phase, phases_or_none
 from .reactions import EventImpulses
 from .wording import with_unit
 

@@ -16,7 +16,7 @@ from ..engine.entry_point import characteristic_rate_within
 from ..errors import AnalysisError, ModelError, import_optional
 from ..model.model import listing, suggest
 from ..numerics.eigen import QuadraticPencil
-from ..numerics.sparse_rank import saddle_point_solver
+from ..numerics.rank import saddle_point_solver
 from .wording import with_unit
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ ROUNDING_PART = 1e-12  # relative to a complex number: smaller real or imaginary
 
 
 @dataclass
-class StateSpace:
+class StateSpaceForm:
     """State-space equations with eliminated constraints; see the properties of `LinearModel`."""
 
     A: np.ndarray
@@ -253,7 +253,7 @@ class LinearModel:
         outputs: Sequence[tuple[str, str]],
         output_values: np.ndarray,
         point: Result,
-        dense: StateSpace | Callable[[], StateSpace],
+        dense: StateSpaceForm | Callable[[], StateSpaceForm],
         sparse: Descriptor | Callable[[], Descriptor],
         turning: np.ndarray,
         seen_from: str = "",
@@ -266,13 +266,13 @@ class LinearModel:
         self.outputs, self.output_units = (tuple(x[k] for x in outputs) for k in range(2))
         self.output_values = output_values
         self.turning, self.seen_from = turning, seen_from
-        self.large = not isinstance(dense, StateSpace)
+        self.large = not isinstance(dense, StateSpaceForm)
         self._dense, self._sparse = dense, sparse
 
     @property
-    def dense(self) -> StateSpace:
+    def dense(self) -> StateSpaceForm:
         """The dense equations."""
-        if not isinstance(self._dense, StateSpace):
+        if not isinstance(self._dense, StateSpaceForm):
             self._dense = self._dense()
         return self._dense
 
@@ -342,7 +342,7 @@ class LinearModel:
         return self.dense.motion
 
     def to_control(self) -> Any:
-        """The model as ``control.StateSpace``; its names have ``_`` in place of points and blanks.
+        """The model as ``control.StateSpaceForm``; its names have ``_`` in place of points and blanks.
 
         Raises
         ------

@@ -16,7 +16,7 @@ AXIS_TOLERANCE = 1e-9  # a principal axis that differs by less from an axis of t
 
 
 @dataclass(frozen=True, eq=False)
-class MassProperties:
+class PrincipalMassProperties:
     """Mass properties of a body, or of all bodies together.
 
     Attributes
@@ -72,10 +72,10 @@ class MassReport:
 
     name: str
     planar: bool
-    bodies: dict[str, MassProperties]
-    total: MassProperties
+    bodies: dict[str, PrincipalMassProperties]
+    total: PrincipalMassProperties
 
-    def __getitem__(self, name: str) -> MassProperties:
+    def __getitem__(self, name: str) -> PrincipalMassProperties:
         """Mass properties of a body."""
         if name not in self.bodies:
             known = list(self.bodies)

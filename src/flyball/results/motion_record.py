@@ -1,24 +1,358 @@
-"""Figures recorded when a motion ends, at some of its output times: energies and errors by which it judges itself.
+"""Figures recorded when a motion ends, and its kinematics at all output times.
 
-The number of times is limited to a small part of the evaluations of the run, so that recording costs little beside it.
+Energies and errors, by which a motion judges itself, are recorded at some of its output times. Their number is limited
+to a small part of the evaluations of the run, so that recording costs little beside it.
+
+Kinematics of bodies and frames, terms of constraint rows and measured quantities are arrays over time, computed by the
+formulas of the compiled engine: compiled for floats, in Python for complex numbers.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..compiler.kernels import PooledBuffer, StructPool
+from ..compiler.struct_layout import Record
 from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, no_output, pooled_work, struct_tables
+from ..engine.kinematics import (
+    BodyKinematics,
+    BodyKinematicsOverTime,
+    BodyTables,
+    attached_record,
+    body_motion,
+    body_pose,
+    kinematics_over_time,
+    load_record,
+    stationary_record,
+    turned_angles,
+    twist_column,
+)
 from ..engine.recorded_figures import RecordedFigures, record_motion_kernel
+from ..engine.rows import COEFFICIENT, row_parameters
 from ..forces import ENERGIES
+from ..math.vec import add, cross, dot, load3, load9, matrix_product, mm, neg, scale, store3, sub
+from ..model.body import Frame, Located
+from ..model.joint import Coordinate, Joint
+from ..tables.law_inputs import force_reading_count
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import System
+from ..tables.table_definitions import KinematicRecords, System, Twists, Wrenches
+from ..tables.values import Values
 
 if TYPE_CHECKING:
     from .result import Result
+
+
+KinematicRecord = tuple
+FULL_TURN = 2.0 * np.pi
+
+
+class RecordedMotion:
+    """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number.
+
+    ``wound``: body -> full turns [rad] that its coordinates count and its angle does not (`Result.wound`). Without
+    ``vdot`` accelerations are not available.
+    """
+
+    def __init__(
+        self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None, wound: Mapping[str, float] | None = None
+    ) -> None:
+        self.x, self.q = x, q
+        self.n = len(q)
+        S = x.system
+        nb, nv = len(S.tree.parent), v.shape[1]
+        own = [] if vdot is None else [vdot]
+        self.dtype = np.result_type(q, v, *own, S.const)  # complex for derivatives
+        self.W: Any = BodyKinematicsOverTime(
+            self.records(KinematicRecords, nb), self.records(Twists, nv), self.zeros(nb, 3)
+        )
+        if self.dtype == float:
+            one = BodyKinematics(KinematicRecords.blank(nb), Twists.blank(nv), np.zeros((nb, 3)))
+            q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
+            kinematics_over_time(BodyTables(S.tree, S.bodies), one, q, v, self.W)
+        else:
+            for b in range(nb):
+                body_pose(S, self.W, b, q.T)
+                body_motion(S, self.W, b, v.T)
+        if vdot is not None:
+            self._accelerate(vdot.T)
+        self._frames: dict[int, KinematicRecord] = {}
+        self._names = {b: name for name, b in x.structure.place.items() if b >= 0}
+        self._wound = wound or {}
+
+    def zeros(self, *shape: int) -> np.ndarray:
+        """Return zeros at every time."""
+        return np.zeros((*shape, self.n), self.dtype)
+
+    def records(self, of: type[Record], count: int) -> Any:
+        """Return records of zeros at every time."""
+        return self.zeros(count, of.layout.width).view(of)
+
+    def _accelerate(self, vdot: np.ndarray) -> None:
+        """Replace the bias accelerations of the bodies by true ones.
+
+        The difference is transmitted from parent to child as in a rigid body, and every twist column adds its vdot.
+        """
+        S, W = self.x.system, self.W
+        missing: list[tuple[tuple, tuple]] = []
+        for b in range(len(S.tree.parent)):
+            p, _, _, _, bias_alpha, bias_a = load_record(W.bodies, b)
+            alpha = a = (0.0, 0.0, 0.0)
+            parent = int(S.tree.parent[b])
+            if parent >= 0:
+                alpha, a = missing[parent]
+                a = add(a, cross(alpha, sub(p, load3(W.bodies.position, parent, 0))))
+            arm = sub(p, load3(W.O, b, 0))
+            for i in range(S.tree.nv[b]):
+                turn, shift = twist_column(S, W, b, i)
+                s = vdot[S.tree.v[b] + i]
+                alpha = add(alpha, scale(s, turn))
+                a = add(a, scale(s, add(shift, cross(turn, arm))))
+            missing.append((alpha, a))
+        for b, (alpha, a) in enumerate(missing):
+            _, _, _, _, bias_alpha, bias_a = load_record(W.bodies, b)
+            store3(W.bodies.angular_acceleration, b, 0, add(bias_alpha, alpha))
+            store3(W.bodies.acceleration, b, 0, add(bias_a, a))
+
+    def body(self, b: int) -> KinematicRecord:
+        """Record of body b's centre of mass."""
+        return load_record(self.W.bodies, b)
+
+    def bodies(self, b: Sequence[int] | np.ndarray) -> KinematicRecord:
+        """Records of several bodies' centres of mass: arrays (bodies, n)."""
+        return load_record(self.W.bodies[b].swapaxes(0, 1)[None], 0)
+
+    def frame(self, k: int) -> KinematicRecord:
+        """Record of frame k."""
+        if k not in self._frames:
+            S = self.x.system
+            offset, turn = load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            b = int(S.frame_body[k])
+            self._frames[k] = self.attached(b, offset, turn)
+        return self._frames[k]
+
+    def forget(self) -> None:
+        """Discard the cached frames; they are computed again on demand."""
+        self._frames.clear()
+
+    def attached(self, b: int, offset: tuple, turn: tuple) -> KinematicRecord:
+        """Return the record of a point and axes fixed on body b (-1: ground)."""
+        if b >= 0:
+            return attached_record(self.body(b), offset, turn)
+        zero = self.zeros()
+        p, R, *rest = stationary_record(offset, turn, zero)
+        return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
+
+    def placed(self, name: str) -> tuple[int, tuple, tuple]:
+        """Return the body (-1: ground) with a named frame, or a body's own; its origin and axes on that body."""
+        p, R = self.x.poses.named(name)
+        e = self.x.structure.model[name]
+        body = e.body if isinstance(e, Frame) else name
+        b = self.x.bodies[body]
+        offset, turn = matrix_product(b.R.T, p - b.c), matrix_product(b.R.T, R)
+        return self.x.structure.place[body], tuple(offset.tolist()), tuple(turn.ravel().tolist())
+
+    def named(self, name: str) -> KinematicRecord:
+        """Return the record of a named frame, or of a body's own frame."""
+        return self.attached(*self.placed(name))
+
+    def angle(self, b: int) -> np.ndarray:
+        """Return the angle [rad] of body b (-1: ground) of a planar mechanism, with full turns; (n,).
+
+        It equals the given angle in the reference configuration and is continuous, for any choice of coordinates.
+        """
+        if b < 0:
+            return self.zeros()
+        return self._angles[self._names[b]] - self._wound.get(self._names[b], 0.0)
+
+    @cached_property
+    def _angles(self) -> dict[str, np.ndarray]:
+        """Return every body's angle as given by the coordinates."""
+        return turned_angles(self.x, self.W, self.q.T)
+
+    def reference_angle(self, b: int) -> float:
+        """Return the reference angle [rad] of body b (-1: ground) of a planar mechanism, with full turns."""
+        return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
+
+
+def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, float]) -> dict[str, float]:
+    """Return the full turns that coordinates count and the angles of bodies do not.
+
+    A joint with an initial angle of two turns includes them in its coordinate; the angles of bodies do not.
+
+    Parameters
+    ----------
+    coordinate_angles : mapping
+        Body -> its turned angle [rad] at the start of a planar motion, as its coordinates have it.
+    angles : mapping
+        Body -> its turned angle there.
+
+    Returns
+    -------
+    dict
+        Body -> excess of its coordinates [rad]; zeros are left out.
+    """
+    ahead = {k: FULL_TURN * round((coordinate_angles[k] - a) / FULL_TURN) for k, a in angles.items()}
+    return {name: float(more) for name, more in ahead.items() if more != 0.0}
+
+
+def coordinate_records(
+    records: RecordedMotion, owner: Joint | Located, what: str
+) -> tuple[KinematicRecord, KinematicRecord, Coordinate]:
+    """Return the records of the frames between which a coordinate of a joint, body or frame is measured."""
+    c = owner.coordinates[what]
+    first, second = (_turned_record(_end(records, owner, role), getattr(c, f"turn_{role}")) for role in c.frames)
+    return first, second, c
+
+
+def _end(records: RecordedMotion, owner: Joint | Located, role: str) -> KinematicRecord:
+    if isinstance(owner, Joint):
+        return records.frame(records.x.structure.frame_at[owner.name, role, ""])
+    return records.named(owner.name) if role == "M" else records.attached(-1, (0.0,) * 3, tuple(np.eye(3).ravel()))
+
+
+def measured_coordinate(
+    records: RecordedMotion, owner: Joint | Located, what: str, turns: Any = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a coordinate without its offset, its rate, and its acceleration if the records have true ones.
+
+    ``turns`` approximates an angle that counts whole turns; if it is None, the angle is continuous as far as the output
+    times resolve it.
+    """
+    F, M, c = coordinate_records(records, owner, what)
+    par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+    counts = c.row.of_kind.turns and turns is not None
+    with np.errstate(all="ignore"):  # at a singular position
+        value, f, tM, tF, second = c.row.of_kind.row(
+            (1.0, *par[1:]) if counts else par, F, M, turns if counts else 0.0, records.x.system.const
+        )
+        rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
+    if c.row.of_kind.turns and not counts:
+        value = value + np.unwrap(np.real(value)) - np.real(value)
+    return c.sign * value, c.sign * rate, c.sign * second
+
+
+def _turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
+    """Return the record with its axes turned by a constant rotation, if there is one."""
+    if not len(turn):
+        return record
+    return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])
+
+
+Wrench = tuple[tuple, tuple]
+
+
+def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRecord, tuple]:
+    """Return the records of frames F and M of term k, and the result of its formula.
+
+    The result is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on
+    F's body, acceleration bias; without its coefficient. The records have no accelerations but those with every vdot
+    zero.
+    """
+    x = result.values
+    t = x.structure.terms[k]
+    F, M = result.motions.frame(t.F), result.motions.frame(t.M)
+    hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
+    kind, par = t.formula.of_kind, row_parameters(x.system.term_parameters, k)
+    if kind.single:
+        return F, M, _time_by_time(kind.row, par, (F, M, hint + result.motions.zeros()), x.system.const)
+    return F, M, kind.row(par, F, M, hint, x.system.const)
+
+
+def _time_by_time(
+    row: Any, par: tuple, over: tuple[KinematicRecord, KinematicRecord, np.ndarray], const: np.ndarray
+) -> tuple:
+    """Return a formula evaluated at one time after another, as arrays over time."""
+    F, M, hint = over
+    n = len(hint)
+    sides = [[tuple(np.broadcast_to(np.stack(np.broadcast_arrays(*x), -1), (n, len(x)))) for x in r] for r in (F, M)]
+    one = [row(par, *(tuple(tuple(x[i]) for x in r) for r in sides), hint[i], const) for i in range(n)]
+    parts = zip(*one, strict=True) if one else ((), (), (), (), ())
+    value, force, on_M, on_F, bias = (np.array(x, hint.dtype) for x in parts)
+    return value, *(tuple(x.reshape(n, 3).T) for x in (force, on_M, on_F)), bias
+
+
+def term_coefficient(result: Result, k: int) -> float:
+    """Return the coefficient of term k in its row or measured quantity."""
+    return result.values.system.term_parameters[k, COEFFICIENT]
+
+
+def unit_effort_wrench(result: Result, owner: Joint | Located, what: str) -> Wrench:
+    """Return the wrench on ``body_j``, or on the body, about M's origin, of a unit effort along a coordinate."""
+    F, M, c = coordinate_records(result.motions, owner, what)
+    par = (*c.row.par[:6], 0.0, 0.0)
+    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
+    force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
+    return scale(c.sign, force), scale(c.sign, torque)
+
+
+def zero_wrenches(records: RecordedMotion) -> Any:
+    """Return zero wrenches on all bodies at every time, `Wrenches`."""
+    return records.records(Wrenches, len(records.x.system.tree.parent))
+
+
+def zero_wrench(records: RecordedMotion) -> Wrench:
+    """Return a zero wrench at every time."""
+    zero = records.zeros()
+    return (zero,) * 3, (zero,) * 3
+
+
+class MeasuredQuantities:
+    """Quantities along which forces act and which laws use."""
+
+    def __init__(self, result: Result) -> None:
+        self._result = result
+        self._known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def quantity(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return value and rate of quantity m over time."""
+        if m not in self._known:
+            self._known[m] = self._found(m)
+        return self._known[m]
+
+    @cached_property
+    def _terms(self) -> dict[int, list[int]]:
+        """Return the terms of every quantity."""
+        s = self._result.values.structure
+        out: dict[int, list[int]] = {m: [] for m in range(len(s.measured))}
+        for k, t in enumerate(s.terms):
+            if t.measured:
+                out[t.row - len(s.rows)].append(k)
+        return out
+
+    def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        value, rate = self._result.motions.zeros(), self._result.motions.zeros()
+        for k in self._terms[m]:
+            F, M, (g, f, tM, tF, _) = term_over_time(self._result, k)
+            c = term_coefficient(self._result, k)
+            value = value + c * g
+            rate = rate + c * (dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2]))
+        return value, rate
+
+    @cached_property
+    def slots(self) -> np.ndarray:
+        """Return the inputs of laws, (3, slots, n).
+
+        They are values, rates as values of their own, loads and forces (not included), states of controllers, and
+        sliding directions of switches.
+        """
+        s = self._result.values.structure
+        n, switches = len(s.measured), len(s.switches)
+        first = 2 * n + len(s.loads) + force_reading_count(s)
+        out = self._result.motions.zeros(3, first + len(s.controls) + switches)
+        if s.controls:
+            out[0, first : first + len(s.controls)] = self._result.states[:, : len(s.controls)].T
+        if s.slots or switches:
+            for m in range(n):
+                out[0, m], out[1, m] = self.quantity(m)
+                out[0, n + m] = out[1, m]
+        if switches and self._result.phases is not None:
+            out[0, -switches:] = self._result.phases.sigma
+        return out
+
 
 SHORTEST_SPAN = 1e-150  # [s]: the square of a shorter one underflows
 SOLVE_TOLERANCE = 1e-13  # relative residual of a solve

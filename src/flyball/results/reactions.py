@@ -29,7 +29,7 @@ from ..model.force import CoordinateForce
 from ..model.messages import suggest
 from ..tables.constraint_rows import reacting_element
 from ..tables.table_definitions import Wrenches
-from .recorded_kinematics import (
+from .motion_record import (
     Wrench,
     term_coefficient,
     term_over_time,
@@ -40,7 +40,7 @@ from .recorded_kinematics import (
 
 if TYPE_CHECKING:
     from ..tables.structure_definition import Structure
-    from .phases import Moment
+    from .events import Moment
     from .result import Result
 
 

@@ -16,18 +16,26 @@ from ..model.model import Model
 from ..model.output_files import PAGE, RESULT, SCENE, TABLE, VIDEO, file_extension, write_file
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
-from .body_sets import SET_MOTION_ARRAYS, BodySetMotion
 from .contacts import Contacts, concatenate_contacts
 from .energy_balance import CONTACT_ELASTIC, Energy, EnergyBudget, total_budget
-from .events import EventRecord, Events, with_moments
+from .events import (
+    EventRecord,
+    Events,
+    Moment,
+    MotionStart,
+    Phase,
+    Phases,
+    event_energies,
+    phases_or_none,
+    split_by_parameters,
+    with_moments,
+)
 from .health import ContactHealth, Health
-from .motion_record import MotionRecord, record_motion
+from .motion_record import MeasuredQuantities, MotionRecord, RecordedMotion, record_motion
 from .part_views import has_view, view_of
 from .part_views.base import Curves, SplicedView
-from .part_views.bodies import BodySetView, SetMemberView
-from .phases import Moment, MotionStart, Phase, Phases, event_energies, phases_or_none, split_by_parameters
+from .part_views.bodies import SET_MOTION_ARRAYS, BodySetMotion, BodySetView, SetMemberView
 from .reactions import EventImpulses, JointReactions
-from .recorded_kinematics import MeasuredQuantities, RecordedMotion
 from .wording import range_text
 
 if TYPE_CHECKING:
@@ -73,7 +81,7 @@ class Result:
     energy : Energy
     wound : dict
         Planar body -> full turns [rad] that coordinates count and its angle does not
-        (`recorded_kinematics.extra_turns`): turns in the initial angles of joints.
+        (`motion_record.extra_turns`): turns in the initial angles of joints.
     contacts : Contacts
         Contact points and forces; None if the mechanism has no contact.
     bulk : dict

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
+from .events import MotionStart
 from .files import (
     MOTION_ARRAYS,
     OWN_GROUP,
@@ -27,7 +28,6 @@ from .files import (
 from .files import unpack_events as events_unpack
 from .files import unpack_phases as stretches_unpack
 from .health import ContactHealth, Health, InitialDeviation
-from .phases import MotionStart
 from .result import Result
 
 ModelType = TypeVar("ModelType", bound=Model)
@@ -51,7 +51,7 @@ def read_result(path: str | os.PathLike, cls: type[ModelType]) -> Result:
         result = _rebuild_result(stored, cls, where)
     except ModelError:
         raise
-    except Exception as error:  # for any content of the file
+    except Exception as error:  # the file may hold anything, and names the user's classes
         raise _damaged_file_error(where, f"{type(error).__name__}: {error}") from None
     if kind < 3:
         late: dict[str, Any] = result.health.late

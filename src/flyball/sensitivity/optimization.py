@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis_options import Options, name_list, require_positive
+from ..analysis_options import AnalysisOptions, name_list, require_positive
 from ..analysis_options import require_count as at_least
 from ..errors import AnalysisError, Interrupted, ModelError
 from ..model.expressions import number
@@ -362,7 +362,7 @@ NOT_DETERMINED = 1e-7  # smallest singular value of the scaled Jacobian, relativ
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitOptions(Options):
+class FitOptions(AnalysisOptions):
     """Arguments of `Mechanism.fit`."""
 
     data: str | os.PathLike | Mapping[str, Any]

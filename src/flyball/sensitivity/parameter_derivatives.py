@@ -48,7 +48,7 @@ from ..engine.kinematics import BodyKinematicsOverTime, joint_velocities, retrac
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..numerics.rank import RANK_TOLERANCE
-from ..results.recorded_kinematics import RecordedMotion
+from ..results.motion_record import RecordedMotion
 from ..simulation.initial_state import InitialState
 from ..simulation.prescribed_motion import leaves_no_freedom
 from ..tables.law_inputs import initial_controller_states

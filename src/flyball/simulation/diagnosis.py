@@ -14,7 +14,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly, undefined_row
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switches.guard_kinds import OFF
+from ..constraints.switches.switch_kind import OFF
 from ..engine import motion
 from ..engine.entry_point import MOTION
 from ..engine.kinematics import load_record
@@ -22,7 +22,7 @@ from ..engine.loads import force_row
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..laws.bytecode import BY_TIME, evaluate, evaluate_jet
 from ..laws.python_functions import function_fault
-from ..mobility.contradictions import explain_contradiction
+from ..mobility.mobility import explain_contradiction
 from ..model.body import GROUND, Driver
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf, fields_with

@@ -23,8 +23,8 @@ from ..mobility.mobility import mobility
 from ..model.event import Set
 from ..model.model import Model
 from ..results.diagnostics import undetermined_event_forces, undetermined_loads
-from ..results.phases import MotionStart, energies_at_end
-from ..results.recorded_kinematics import extra_turns
+from ..results.events import MotionStart, energies_at_end
+from ..results.motion_record import extra_turns
 from ..results.result import Result
 from ..tables.constraint_rows import declared_switches
 from ..tables.coordinate_choice import (
@@ -48,7 +48,6 @@ COORDINATES = ("auto", "absolute", "joint")
 THIN_INERTIA = 1e-7  # negligible inertia of a coordinate, relative to total mass times the mechanism's length squared
 SINGULAR_MASS = 1e-13  # smallest eigenvalue of the mass matrix scaled to a unit diagonal; smaller ones are rounding
 MOST_AVOIDED = 8  # joints that are removed from the spanning forest, one after the other, before giving up
-UNSOLVED = 1e-9  # relative residual of the equations that is allowed at the start
 
 
 def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | None) -> tuple[Assembly, str]:

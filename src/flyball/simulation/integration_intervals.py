@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switches.guard_kinds import G_LAW
+from ..constraints.switches.switch_kind import G_LAW
 from ..engine.pulse_detection import law_starts
 from ..engine.sampled_controllers import INSTANT_TOLERANCE, SampledControllers, SamplePlan
 from ..errors import ModelError
@@ -143,7 +143,6 @@ def whole_motion() -> Segment:
     return Segment(lasts=math.inf)
 
 
-LAWS_PER_FORCE = 3  # laws of one force
 SLIVER = 2e-14  # shortest remainder of an interval that is integrated, relative to the largest time
 
 

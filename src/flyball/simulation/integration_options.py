@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..analysis_options import Options, names_of, require_count, require_positive, seconds
+from ..analysis_options import AnalysisOptions, names_of, require_count, require_positive, seconds
 from ..engine import stabilization
 from ..errors import ModelError
 from ..numerics.complementarity.solver_choice import solver_names
@@ -41,7 +41,7 @@ LEAST_ATOL = 1e-14  # smallest default atol
 
 
 @dataclass(frozen=True, kw_only=True)
-class Integration(Options):
+class Integration(AnalysisOptions):
     """Options of an integration, as stored in the result; `Mechanism.simulate` describes them."""
 
     coordinates: str

@@ -26,9 +26,9 @@ from ..results.result import Result
 from ..tables.contact_places import ContactPlaces, contact_places
 from ..tables.element_numbers import element_numbers
 from .diagnosis import InitialOverlap, UnresolvedInstant
-from .implicit.jacobian_pattern import jacobian_layout
 from .initial_state import InitialState, initial_state_at
 from .integration_options import MOST_STEPS, Integration, Stepping
+from .jacobian_pattern import jacobian_layout
 from .solver_switching import AUTO_CODE as EITHER
 from .solver_switching import EXPLICIT_METHOD, check_specialize
 

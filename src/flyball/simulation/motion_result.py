@@ -15,7 +15,7 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..compiler.announcements import compiled_since
+from ..compiler.object_files import compiled_since
 from ..engine.entry_point import COMPLETE, INTEGRATE, MOTION, run_task
 from ..engine.pulse_detection import INSPECTION_ROWS
 from ..errors import SimulationError
@@ -25,7 +25,7 @@ from ..model.event import Set
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
 from ..results import diagnostics
-from ..results.event_driven_contacts import event_driven_contacts
+from ..results.contacts import event_driven_contacts
 from ..results.health import Health, changed_velocities, velocity_not_allowed
 from ..results.motion_record import record_motion
 from ..results.result import DeferredArrays, Result

@@ -28,7 +28,7 @@ from ..tables.table_definitions import FREE, SPHERICAL, System
 from . import initial_state
 from .events.context import EventContext
 from .events.event_loop import integrate_events
-from .implicit.integrators import refuse_for_variational
+from .implicit_integrators import refuse_for_variational
 from .impulse_stepping.impulse_simulation import simulate_by_impulses
 from .initial_state import InitialState, find_initial_state, start_time
 from .integration_intervals import (

@@ -23,7 +23,7 @@ import numpy as np
 
 from .. import codegen
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..constraints.switches.guard_kinds import OFF
+from ..constraints.switches.switch_kind import OFF
 from ..engine.entry_point import MOTION, evaluate_state
 from ..errors import ModelError
 from ..numerics.eigen import dominant_eigenvalue

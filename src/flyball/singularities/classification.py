@@ -23,8 +23,7 @@ import numpy as np
 from ..errors import NotConverged
 from ..results.singularities import Branch, Motion, Singularity
 from ..results.wording import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
-from .closure_equations import ClosureEquations, CurvePoint, JacobianRank, ReleasedMechanism
-from .continuation import CurveTracer, rank_limit
+from .continuation import ClosureEquations, CurvePoint, CurveTracer, JacobianRank, ReleasedMechanism, rank_limit
 
 VANISHING_FORM = 1e-7  # forms below this part of the size of the derivatives vanish
 SPHERE_STARTS = 400

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis_options import Options, require_positive
+from ..analysis_options import AnalysisOptions, require_positive
 from ..analysis_options import require_count as at_least
 from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
@@ -20,15 +20,17 @@ from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import null_space
 from ..results.singularities import Branch, Singularities
 from .classification import BranchCurve, branches_through, classify
-from .closure_equations import CurvePoint, ReleasedMechanism, release_driver
 from .continuation import (
     SAME_POINT,
     STATIONARY_DRIVER,
     CurveNode,
+    CurvePoint,
     CurveTracer,
+    ReleasedMechanism,
     TracedCurve,
     locate_branch_point,
     rank_limit,
+    release_driver,
 )
 
 START_TOLERANCE = 1e-4  # a start nearer than this to a singular position is moved onto it [1]
@@ -36,7 +38,7 @@ RANGE_TOLERANCE = 1e-9  # distance beyond the ends of the range allowed for a si
 
 
 @dataclass(frozen=True, kw_only=True)
-class SingularitiesOptions(Options):
+class SingularitiesOptions(AnalysisOptions):
     """Arguments of `Mechanism.singularities`."""
 
     driver: str

@@ -13,8 +13,7 @@ from ..collision.contact_finder import ContactFinder
 from ..collision.tables import (
     Geometry,
 )
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import force_magnitudes
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, force_magnitudes
 from ..errors import ModelError
 from ..math.vec import axes_across
 from ..model.body import GROUND

@@ -25,13 +25,14 @@ from ..results.wording import MARGINAL, NOT_JUDGED
 from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
 from ..simulation.impulse_stepping.setup import (
     MechanismMotion,
+    StepSize,
     make_stepper,
     movers_of_assembly,
     partition_bodies,
     separate_mechanism,
+    smallest_radius,
     values_with_stops,
 )
-from ..simulation.impulse_stepping.step_size import StepSize, smallest_radius
 from ..simulation.impulse_stepping.stepper import ImpulseStepper, NoSolution
 from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import StateSizes, state_sizes
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, StateSizes, state_sizes
 from ..derivatives.output_derivatives import snapshot
 from ..derivatives.reduced_equations import free_coordinates
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
@@ -193,7 +192,7 @@ LINEARIZE_DEFAULTS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class EquilibriumOptions(Options):
+class EquilibriumOptions(AnalysisOptions):
     """Arguments of `Mechanism.equilibrium`."""
 
     t: float

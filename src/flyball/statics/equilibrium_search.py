@@ -19,8 +19,9 @@ import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.positions_and_velocities import row_scales
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import (
+from ..derivatives.equation_derivatives import (
+    EquationDerivatives,
+    MechanismState,
     force_magnitudes,
     is_balanced,
     is_balanced_beyond_rounding,
@@ -34,7 +35,7 @@ from ..engine.kinematics import retract
 from ..errors import ModelError, NotConverged, SingularityError
 from ..model.joint import Joint
 from ..model.messages import listing, suggest
-from ..numerics.sparse_rank import clearly_independent
+from ..numerics.rank import clearly_independent
 from ..results.equilibrium import Equilibrium
 from ..simulation.initial_state import choose_coordinates
 from ..tables.forest import coordinate_row

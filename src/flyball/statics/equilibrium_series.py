@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..errors import AnalysisError, ModelError, NotConverged
@@ -48,7 +48,7 @@ SMALLEST_STEP = 1e-7  # step size [rad, or relative to the length] at which roun
 
 
 @dataclass(frozen=True, kw_only=True)
-class EquilibriaOptions(Options):
+class EquilibriaOptions(AnalysisOptions):
     """Arguments of `Mechanism.equilibria`."""
 
     parameter: str

@@ -19,8 +19,7 @@ import numpy as np
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
-from ..constraints.switches.guard_kinds import STATIC
-from ..constraints.switches.switch_kind import INTERVAL, NO_ROW, SwitchKind
+from ..constraints.switches.switch_kind import INTERVAL, NO_ROW, STATIC, SwitchKind
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
 from ..engine.entry_point import MOTION

@@ -20,8 +20,9 @@ import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..derivatives.eigenvalues import Spectrum, spectrum
-from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from ..derivatives.force_balance import (
+from ..derivatives.equation_derivatives import (
+    EquationDerivatives,
+    MechanismState,
     StateSizes,
     force_magnitudes,
     is_balanced,

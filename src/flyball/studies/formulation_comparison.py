@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis_options import Options, require_count, seconds
+from ..analysis_options import AnalysisOptions, require_count, seconds
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..engine.entry_point import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
@@ -25,7 +25,7 @@ from ..results.result import Result
 from ..simulation import initial_state
 from ..simulation.events.context import EventContext
 from ..simulation.events.event_loop import integrate_events
-from ..simulation.implicit.integrators import refuse_for_variational
+from ..simulation.implicit_integrators import refuse_for_variational
 from ..simulation.initial_state import InitialState, find_initial_state, start_time
 from ..simulation.integration_options import MOST_STEPS, Integration, output_times
 from ..simulation.law_faults import refuse_out_of_table
@@ -105,7 +105,7 @@ FORMULATIONS = EXPLICIT_FORMULATIONS | IMPLICIT_FORMULATIONS
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareOptions(Options):
+class CompareOptions(AnalysisOptions):
     """Arguments of `Mechanism.compare`."""
 
     t_end: float

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis_options import AssembleOptions, Options
+from ..analysis_options import AnalysisOptions, AssembleOptions
 from ..assembly.assemble import assemble
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
@@ -125,7 +125,9 @@ class RunAnalysis:
     def refuse(self, model: Model) -> None:
         """Refuse a model that the analysis does not support, before any run."""
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Options of each run, except the varied parameters."""
         raise NotImplementedError
 
@@ -191,7 +193,9 @@ class MotionAnalysis(TimedAnalysis):
     title = "motion"
     takes = (*(f for f in SimulateOptions.__dataclass_fields__ if f not in ("parameters", "progress")),)
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Options of the study, with its output times."""
         return SimulateOptions.from_arguments({**known, "outputs": times, "progress": False})
 
@@ -217,7 +221,9 @@ class KinematicsAnalysis(TimedAnalysis):
         """Refuse elements whose state depends on a motion."""
         refuse_unsupported(model, self.title, is_checked_afterwards)
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Options of the study, with its output times."""
         return KinematicsOptions.from_arguments({**known, "times": times, "t_end": None, "progress": False})
 
@@ -227,7 +233,7 @@ class KinematicsAnalysis(TimedAnalysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FunctionOptions(Options):
+class FunctionOptions(AnalysisOptions):
     """Arguments of a user's function: the values of the parameters."""
 
     parameters: Mapping[str, float] | None
@@ -240,7 +246,9 @@ class FunctionAnalysis(RunAnalysis):
     function: Callable[[Any, dict[str, float]], Any]
     title = "function"
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """The values of parameters."""
         return FunctionOptions.from_arguments(known)
 
@@ -293,7 +301,9 @@ class InstantAnalysis(RunAnalysis):
                 "parts with modes; analysis='motion' does"
             )
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Time and parameters."""
         return AssembleOptions.from_arguments({**known, "t": known["t"] or 0.0})
 
@@ -321,7 +331,9 @@ class EquilibriumAnalysis(InstantAnalysis):
     def refuse(self, model: Model) -> None:
         """Refuse nothing here: each run refuses what it does not support."""
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Options of the equilibrium; every run starts from the described position."""
         return rest_options(known["t"] or 0.0, known["parameters"])
 
@@ -350,7 +362,7 @@ class EquilibriumAnalysis(InstantAnalysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SmallMotionOptions(Options):
+class SmallMotionOptions(AnalysisOptions):
     """Operating point of small motions: as described at ``t``, or the equilibrium."""
 
     t: float
@@ -377,7 +389,9 @@ class SmallMotionAnalysis(RunAnalysis):
 
     takes = ("t", "about")
 
-    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+    def options(
+        self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]
+    ) -> AnalysisOptions:
         """Operating point, inputs and outputs."""
         out, into = (
             tuple(dict.fromkeys(r.of[k] for r in quantities if r.how == VALUE and len(r.of) == 3)) for k in (0, 1)

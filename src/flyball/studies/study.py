@@ -152,7 +152,7 @@ def _compute_run(question: RunSpecification, point: np.ndarray, out: RunResults,
             out.doubtful[k] = "; ".join(doubts)
         if remarks := (*single.remarks(found), *doubts):
             out.remarks[k] = "; ".join(map(str, remarks))
-    except Exception as error:
+    except Exception as error:  # a run calls the user's functions, which may raise anything
         out.status[k], out.reasons[k] = FAILED, _failure_text(error)
         return
     out.status[k] = DONE
@@ -177,7 +177,7 @@ def pickled_specification(question: RunSpecification, runs: int) -> tuple[str, b
     """
     try:
         data = pickle.dumps((question, runs))
-    except Exception as pickling:
+    except Exception as pickling:  # the user's objects may raise anything
         data = _pickled_by_value((question, runs), pickling)
     return hashlib.sha256(data).hexdigest(), data
 
@@ -513,7 +513,7 @@ def _compute_missing(question: RunSpecification, found: Study, o: StudyOptions, 
         found.message = "interrupted by the user; the completed runs are kept"
     except FlyballError:
         raise
-    except Exception as error:
+    except Exception as error:  # of the user's executor
         if o.file is not None:
             save_study(found, o.file)
         kept = (

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..analysis_options import Options
+from ..analysis_options import AnalysisOptions
 from ..assembly.assembled_state import Assembly
 from ..errors import AnalysisError, ModelError
-from ..expression_graph.evaluation import expanded_symbol_count
-from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, object_vector
+from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, expanded_symbol_count, object_vector
 from ..model.expressions import is_number_text
 from ..model.model import Model
 from ..model.output_files import LATEX, PAGE, write_file
@@ -28,15 +27,15 @@ from ..results.result import Result
 from ..tables.structure import Choices, structure
 from ..tables.table_definitions import FREE
 from ..tables.values import values
-from .coordinates import CoordinateChoice, initial_assembly
-from .document.document import document
-from .document.parts import Document
-from .document.writers import latex_document, text_document
+from .document_formats import Document, latex_document, text_document
+from .equations_document import document
 from .expressions import Expressions, SymbolTable
 from .named_equations import (
+    CoordinateChoice,
     CurveParameter,
     NamedEquations,
     curve_parameters_at,
+    initial_assembly,
     quaternions,
     state_by_symbol,
     trace_named_equations,
@@ -44,16 +43,15 @@ from .named_equations import (
 
 if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
-    from .explicit.explicit_equations import ExplicitEquations
-    from .explicit.state_space import StateEquations
-    from .export.code import Code
+    from .explicit.explicit_equations import ExplicitEquations, StateEquations
+    from .export import Code
     from .joint_equations import JointEquations
     from .lagrange import Lagrange
     from .linear.linear_equations import LinearEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class SymbolicOptions(Options):
+class SymbolicOptions(AnalysisOptions):
     """Arguments of `Mechanism.symbolic`."""
 
     coordinates: str
@@ -633,7 +631,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         SingularityError
             If the reference configuration is a singular position.
         """
-        from .explicit.state_space import StateEquations
+        from .explicit.explicit_equations import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
 
@@ -666,7 +664,7 @@ class Equations(EquationDisplay, Linearization, EquationSymbols):
         name: str = "",
     ) -> Code:
         """Functions of these equations as code: see `Mechanism.export`."""
-        from .export.code import export_equations
+        from .export import export_equations
 
         return export_equations(self, folder, language=language, functions=functions, outputs=outputs, name=name)
 

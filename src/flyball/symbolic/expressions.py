@@ -13,14 +13,26 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..expression_graph.evaluation import evaluate, evaluate_array, jacobian, nodes_in_order, substitute
-from ..expression_graph.graph import SYMBOL, Graph, Node, OpaqueFunction
+from ..expression_graph.graph import (
+    SYMBOL,
+    Graph,
+    Node,
+    OpaqueFunction,
+    evaluate,
+    evaluate_array,
+    jacobian,
+    nodes_in_order,
+    substitute,
+)
 from ..expression_graph.printers import latex, text
 from ..expression_graph.printers.sympy import SympyPrinter
-from ..expression_graph.simplification.arctangents import ArctangentSubstitution, without_absolute_values
-from ..expression_graph.simplification.common_subexpressions import simplified_with_symbols
-from ..expression_graph.simplification.reading_cost import symbol_count
-from ..expression_graph.simplification.simplify import simplified
+from ..expression_graph.simplification.factors import symbol_count
+from ..expression_graph.simplification.simplify import (
+    ArctangentSubstitution,
+    simplified,
+    simplified_with_symbols,
+    without_absolute_values,
+)
 from ..model.messages import listing, suggest
 
 MAX_LETTERS = 6000  # that are printed

@@ -17,8 +17,7 @@ import numpy as np
 from ..constraints import coincident, displacement, distance, knife_edge, perpendicular, relative_spin, skew_lines
 from ..constraints.registry import Kind
 from ..errors import ModelError
-from ..expression_graph.evaluation import symbols_of
-from ..expression_graph.graph import Graph, Node, Symbol, object_vector
+from ..expression_graph.graph import Graph, Node, Symbol, object_vector, symbols_of
 from ..math.rotation import axes_in_base, axis_rotation
 from ..math.vec import mm, neg, quaternion_matrix
 from ..model.joint import Joint

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..engine.kinematics import quaternion_at
-from ..expression_graph.evaluation import jacobian
-from ..expression_graph.graph import object_vector
+from ..expression_graph.graph import jacobian, object_vector
 from ..math.vec import cross
 from .expressions import Expressions
 from .named_equations import generalised_forces

@@ -16,14 +16,16 @@ import numpy as np
 from ..compiler.kernels import CodeTable, code_table
 from ..constraints.blocks import ConstraintRow, Row
 from ..constraints.registry import SIGNATURES
-from ..constraints.switches.guard_kinds import (
+from ..constraints.switches.lock import LOCK
+from ..constraints.switches.switch_kind import (
+    DISC,
     G_LAW,
     G_OWN,
     G_SHARED,
+    INTERVAL,
+    NO_ROW,
 )
-from ..constraints.switches.guard_kinds import SIGNATURES as SWITCH_SIGNATURES
-from ..constraints.switches.lock import LOCK
-from ..constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW
+from ..constraints.switches.switch_kind import SIGNATURES as SWITCH_SIGNATURES
 from ..model.body import Body, Driver, Frame, Initial, Located
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf

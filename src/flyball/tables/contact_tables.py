@@ -13,7 +13,14 @@ import numpy as np
 
 from ..collision import shape_kinds
 from ..collision import tables as ct
-from ..collision.convex_decomposition import MAX_PARTS, PART_TOLERANCE, ConvexParts, Hull, convex_hull, convex_parts
+from ..collision.convex_decomposition import (
+    MAX_PARTS,
+    PART_TOLERANCE,
+    ConvexParts,
+    ConvexPolyhedron,
+    convex_hull,
+    convex_parts,
+)
 from ..collision.shapes.solid import SUPPORT_SIGNATURES
 from ..collision.tables import Movers
 from ..compiler.kernels import CodeTable, code_table, table_addresses
@@ -132,10 +139,10 @@ def outline_forms(form: ConvexPart) -> list[ConvexPart]:
     return [form]
 
 
-def _hull_form(h: Hull, form: ConvexPart, rounding: float) -> ConvexPart:
+def _hull_form(h: ConvexPolyhedron, form: ConvexPart, rounding: float) -> ConvexPart:
     """Convex part of a hull, with the middle of its bounding box as origin."""
     middle = (h.vertices.min(axis=0) + h.vertices.max(axis=0)) / 2
-    h = Hull(h.vertices - middle, h.normals, h.sides)
+    h = ConvexPolyhedron(h.vertices - middle, h.normals, h.sides)
     face, edges = h.table(0)
     return ConvexPart(
         "HULL",

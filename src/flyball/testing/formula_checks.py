@@ -17,11 +17,10 @@ import numpy as np
 from ..compiler.kernels import CodeTable, FormulaCode, Signature, short_reason
 from ..constraints.blocks import ConstraintRow
 from ..constraints.registry import SIGNATURES as ROWS
-from ..constraints.switches.guard_kinds import HELD, OFF, STEADY
-from ..constraints.switches.guard_kinds import SIGNATURES as GUARDS
+from ..constraints.switches.switch_kind import HELD, OFF, STEADY
+from ..constraints.switches.switch_kind import SIGNATURES as GUARDS
 from ..errors import ModelError
-from ..expression_graph.evaluation import evaluate
-from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision
+from ..expression_graph.graph import Graph, Symbol, UndeterminedDecision, evaluate
 from ..forces import SIGNATURES
 from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce, Force
@@ -223,7 +222,7 @@ def finite(s: Subject) -> str:
     for state in s.states:
         try:
             found = state.function(*state.arguments)
-        except Exception as error:
+        except Exception as error:  # a user's formula may raise anything
             return f"{state.signature} raises {type(error).__name__}: {error}"
         lengths = _lengths(found)
         if lengths != state.signature.result:

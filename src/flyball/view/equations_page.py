@@ -5,8 +5,21 @@ from __future__ import annotations
 from html import escape
 
 from ..expression_graph.printers.mathml import formula as math
-from ..symbolic.document.parts import Block, Cell, DataTable, Display, Document, Formula, Matrix, Paragraph, Tex
-from ..symbolic.document.writers import aligned_lines, fits_width, matrix_cells, nonzero_entries
+from ..symbolic.document_formats import (
+    Block,
+    Cell,
+    DataTable,
+    Display,
+    Document,
+    Formula,
+    Matrix,
+    Paragraph,
+    Tex,
+    aligned_lines,
+    fits_width,
+    matrix_cells,
+    nonzero_entries,
+)
 from .page import fill_template, static
 
 FORMULA_WIDTH = 112  # characters in a line of a formula

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..results.event_driven_contacts import event_driven_contacts
-from ..results.phases import Moment, Phase, Phases, event_energies
+from ..results.contacts import event_driven_contacts
+from ..results.events import Moment, Phase, Phases, event_energies
 
 if TYPE_CHECKING:
     from ..results.result import Result

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..constraints.switches.guard_kinds import FROZEN, OFF
+from ..constraints.switches.switch_kind import FROZEN, OFF
 from ..model.element import written_fields
 from ..model.joint import Joint
 from ..model.model_files import dumps
-from ..results.events import EventRecord
-from ..results.phases import Moment
+from ..results.events import EventRecord, Moment
 from ..results.wording import tuple_text
 from .animation import attachment_text, motion_to_show, record_motion
 from .figures import standard_figures

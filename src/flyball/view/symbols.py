@@ -16,7 +16,7 @@ from ..model.body import GROUND
 from ..model.force import CoordinateForce
 from ..model.geometry import matrix_to_quaternion
 from ..model.joint import Joint
-from ..results.recorded_kinematics import unit_effort_wrench
+from ..results.motion_record import unit_effort_wrench
 from .recording import RecordedCurve, RecordedJoint, RecordedLine
 
 if TYPE_CHECKING:

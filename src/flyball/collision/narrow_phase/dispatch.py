@@ -13,9 +13,8 @@ from math import inf
 from ...compiler.formulas import formula, generated_formula
 from ...compiler.kernels import Kernel, kernel
 from ...math.vec import add, dot, load3, load9, mm, mv, sub
-from ..broad_phase.workspace import Search
 from ..shape_kinds import FIELD, PLANAR
-from ..tables import Geometry, Movers
+from ..tables import Geometry, Movers, Search
 from .distance import generic_pair
 from .special_pairs.registry import PAIR_FORMULAS
 

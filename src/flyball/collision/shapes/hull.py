@@ -1,4 +1,4 @@
-"""A convex polyhedron, written into the tables by `convex_decomposition.Hull`.
+"""A convex polyhedron, written into the tables by `convex_decomposition.ConvexPolyhedron`.
 
 Vertices are in `Geometry.vertex` from row ``first`` on, followed by the outward unit normals of its faces, one per
 row. Faces are in `Geometry.face` from ``face_first`` on; corners are numbered from the hull's first vertex.

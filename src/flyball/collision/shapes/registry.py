@@ -29,7 +29,7 @@ from ...math.vec import store3
 
 
 @dataclass(frozen=True)
-class Shape:
+class ShapeKind:
     """A kind of convex shape."""
 
     kind: int
@@ -51,7 +51,7 @@ def _modules() -> list[ModuleType]:
     return [importlib.import_module(f"{package}.{name}") for name in names]
 
 
-def declared_shapes(modules: list[ModuleType]) -> tuple[Shape, ...]:
+def declared_shapes(modules: list[ModuleType]) -> tuple[ShapeKind, ...]:
     """Collect the shapes declared by these modules, by number.
 
     Raises
@@ -59,7 +59,7 @@ def declared_shapes(modules: list[ModuleType]) -> tuple[Shape, ...]:
     RuntimeError
         If a number is taken twice.
     """
-    shapes: dict[int, Shape] = {}
+    shapes: dict[int, ShapeKind] = {}
     for m in modules:
         if hasattr(m, "KIND"):
             if m.KIND in shapes:
@@ -67,7 +67,7 @@ def declared_shapes(modules: list[ModuleType]) -> tuple[Shape, ...]:
                 raise RuntimeError(
                     f"shape KIND {m.KIND} is taken twice, the second time by {m.__name__}; the next free is {free}"
                 )
-            shapes[m.KIND] = Shape(m.KIND, m.support, getattr(m, "face", None), getattr(m, "radius", no_rounding))
+            shapes[m.KIND] = ShapeKind(m.KIND, m.support, getattr(m, "face", None), getattr(m, "radius", no_rounding))
     return tuple(shapes[k] for k in sorted(shapes))
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .guard_kinds import G_CONE, G_EDGE, G_TURNS
-from .switch_kind import DISC, SwitchKind
+from .switch_kind import DISC, G_CONE, G_EDGE, G_TURNS, SwitchKind
 
 SLIP = SwitchKind(
     guards=(G_CONE, G_TURNS), forces=DISC, kinetic=True, numbers=("static_friction", "kinetic_friction"),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .guard_kinds import FROZEN, G_PRESS_LOWER, G_PRESS_UPPER
-from .switch_kind import SLOW_ACCELERATION, Instant, SwitchKind
+from .switch_kind import FROZEN, G_PRESS_LOWER, G_PRESS_UPPER, SLOW_ACCELERATION, Instant, SwitchKind
 
 UNDECIDED_SIDE = 0.0  # direction of an elastic switch whose force follows from its position
 ELASTIC = SwitchKind(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, SLIDING
-from .guard_kinds import BY_RATE, G_HOLDS, G_SLIDES, OFF, STATIC
-from .switch_kind import INTERVAL, Instant, ProblemRow, SwitchKind
+from .switch_kind import BY_RATE, G_HOLDS, G_SLIDES, INTERVAL, OFF, STATIC, Instant, ProblemRow, SwitchKind
 
 
 class Friction(SwitchKind):

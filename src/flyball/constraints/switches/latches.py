@@ -8,9 +8,20 @@ from typing import Any
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import AT_REST, NO_IMPULSE, UNILATERAL
-from .guard_kinds import G_BACK, G_LOWER, G_PULL, G_REVERSES, OFF, TURN
-from .stop import Stop
-from .switch_kind import ONE_SIDED, SLOW_ACCELERATION, Instant, ProblemRow, SwitchKind
+from .stop import RigidStop
+from .switch_kind import (
+    G_BACK,
+    G_LOWER,
+    G_PULL,
+    G_REVERSES,
+    OFF,
+    ONE_SIDED,
+    SLOW_ACCELERATION,
+    TURN,
+    Instant,
+    ProblemRow,
+    SwitchKind,
+)
 
 TOOTH_TOLERANCE = 1e-9  # part of the pitch within which a tooth is reached
 
@@ -39,7 +50,7 @@ class OneWayLatch(SwitchKind):
         return 1.0
 
 
-class RatchetLatch(Stop):
+class RatchetLatch(RigidStop):
     """A stop at the last tooth passed: its lower bound is removed while it moves forwards."""
 
     def initial_numbers(self, named: dict[str, Any]) -> dict[str, Any]:

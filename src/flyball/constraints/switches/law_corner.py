@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .guard_kinds import G_CORNER
-from .switch_kind import SwitchKind
+from .switch_kind import G_CORNER, SwitchKind
 
 CORNER = SwitchKind(guards=(G_CORNER,), numbers=())
 """A nonsmooth point of a law, without a row."""

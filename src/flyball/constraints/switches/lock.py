@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ...numerics.complementarity.dense_problem import BILATERAL
-from .guard_kinds import OFF
-from .switch_kind import ANY_FORCE, Instant, ProblemRow, SwitchKind
+from .switch_kind import ANY_FORCE, OFF, Instant, ProblemRow, SwitchKind
 
 
 class EventLock(SwitchKind):

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from ...numerics.complementarity.dense_problem import AT_REST, BILATERAL, NO_IMPULSE, UNILATERAL
-from .guard_kinds import G_LOWER, G_PULL, G_UPPER, OFF
-from .switch_kind import ONE_SIDED, Instant, ProblemRow, SwitchKind
+from .switch_kind import G_LOWER, G_PULL, G_UPPER, OFF, ONE_SIDED, Instant, ProblemRow, SwitchKind
 
 
-class Stop(SwitchKind):
+class RigidStop(SwitchKind):
     """A row that is active at a bound while it pushes; impacts rebound by the coefficient of restitution."""
 
     def velocity_rows(self, n: Instant, s: int, at: tuple[float, ...], still: bool) -> list[ProblemRow]:
@@ -50,7 +49,7 @@ def bound_rows(s: int, at: tuple[float, ...], state: int = AT_REST) -> list[Prob
     return [ProblemRow(s, BILATERAL)] if len(at) > 1 else [ProblemRow(s, UNILATERAL, at[0], state=state)]
 
 
-STOP = Stop(
+STOP = RigidStop(
     guards=(G_LOWER, G_UPPER, G_PULL), forces=ONE_SIDED, bounded=True, role="is closed",
     closing=("close", "closes"), opening=("open", "opens"), states=("closed", "open"),
 )  # fmt: skip

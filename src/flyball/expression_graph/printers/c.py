@@ -10,14 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..evaluation import nodes_in_order
-from ..graph import Function
+from ..graph import Function, nodes_in_order
 from .routines import (
     Argument,
     Identifiers,
     Language,
+    PrintedTable,
     Routine,
-    Table,
     refuse_python_functions,
     spline_tables,
     statements,
@@ -156,7 +155,7 @@ def _comment(text: str) -> str:
     return "/* " + "\n".join(("   " + x).rstrip() for x in text.splitlines()).lstrip() + " */\n"
 
 
-def _table(t: Table) -> str:
+def _table(t: PrintedTable) -> str:
     numbers = wrapped_items("    ", [literal(x) for x in t.data])
     text = "\n".join([f"static const double {t.name}[] = {{", *numbers, "};\n\n"])
     if t.moved:

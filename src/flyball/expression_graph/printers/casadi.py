@@ -10,8 +10,7 @@ import numpy as np
 
 from ...errors import ModelError, import_optional
 from ...math.spline import BREAKS, PIECE
-from ..evaluation import nodes_in_order
-from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Function, Node
+from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Function, Node, nodes_in_order
 from .routines import Routine, refuse_python_functions
 
 

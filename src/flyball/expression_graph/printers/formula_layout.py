@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from ..graph import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node, Symbol
-from ..simplification.reading_cost import ExactNumber, exact_number, reading_cost
+from ..simplification.factors import ExactNumber, exact_number, reading_cost
 
 
 def wrap_fragments(fragments: list[str], most: int, width: Callable[[str], int] = len) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..graph import ADD, NUMBER, POWER, SYMBOL, Node
-from ..simplification.reading_cost import ExactNumber
+from ..simplification.factors import ExactNumber
 from .formula_layout import Layout, Power, Term, latex_escaped, latex_symbol, number_text
 
 OPERATORS = {

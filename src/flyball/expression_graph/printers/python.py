@@ -15,8 +15,8 @@ from .routines import (
     Argument,
     Identifiers,
     Language,
+    PrintedTable,
     Routine,
-    Table,
     python_functions_of,
     spline_tables,
     statements,
@@ -152,7 +152,7 @@ def constant_definitions(constants: Mapping[str, Sequence[Any]] | None) -> str:
     return text + "\n" if text else ""
 
 
-def table_data(known: Iterable[Table]) -> str:
+def table_data(known: Iterable[PrintedTable]) -> str:
     """Numbers of tables, as arrays of the module."""
     text = ""
     for t in known:

@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import ModelError
-from ..evaluation import nodes_in_order
-from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Function, Node
+from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Function, Node, nodes_in_order
 
 
 class Identifiers:
@@ -168,7 +167,7 @@ def is_negated(x: Node) -> bool:
 
 
 @dataclass(frozen=True)
-class Table:
+class PrintedTable:
     """A spline for printing; `math/spline.py` describes its numbers."""
 
     name: str
@@ -176,13 +175,13 @@ class Table:
     moved: tuple[int, ...]  # indices of numbers that are arguments of each call
 
 
-def spline_tables(routines: Iterable[Routine], names: Identifiers) -> dict[int, Table]:
+def spline_tables(routines: Iterable[Routine], names: Identifiers) -> dict[int, PrintedTable]:
     """Tables that routines call, by the identity of the function for their value."""
-    found: dict[int, Table] = {}
+    found: dict[int, PrintedTable] = {}
     for f in called_functions(routines):
         if "table" in f.details and id(f.details["value"]) not in found:
             name = names(f"table_{len(found) + 1}")
-            found[id(f.details["value"])] = Table(name, tuple(f.details["table"]), tuple(f.details["moved"]))
+            found[id(f.details["value"])] = PrintedTable(name, tuple(f.details["table"]), tuple(f.details["moved"]))
     return found
 
 

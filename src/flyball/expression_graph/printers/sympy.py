@@ -16,8 +16,7 @@ import numpy as np
 from ...errors import ModelError, import_optional
 from ...math import scalar
 from ...math.spline import spline_expression
-from ..evaluation import nodes_in_order
-from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL, Function, Graph, Node
+from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL, Function, Graph, Node, nodes_in_order
 from .routines import Identifiers
 
 SYMPY_FUNCTIONS: dict[str, Callable[..., Any]] = {

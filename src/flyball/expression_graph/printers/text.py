@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..graph import NUMBER, POWER, SYMBOL, Node
-from ..simplification.reading_cost import ExactNumber
+from ..simplification.factors import ExactNumber
 from .formula_layout import Layout, Power, Term, number_text, wrap_fragments
 
 NAMES = {"absolute": "abs", "minimum": "min", "maximum": "max", "rounded": "round"}

@@ -1,17 +1,25 @@
-"""Expansion of expressions into sums of terms, and the search for the shortest equivalent expression."""
+"""The shortest equivalent expression, found by expansion into sums of terms; symbols for common subexpressions.
+
+Symbols also stand for long expressions inside others. Sines and cosines of arctangents become algebraic expressions:
+
+    w = atan2(y, x):   cos w = x / r,   sin w = y / r,   r^2 = x^2 + y^2
+
+Sums of angles follow from the addition theorems; whole turns are dropped. For reading only: a parameter keeps the sign
+of its own value, so that sqrt(l^2) = l for a length.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
 
-from ..evaluation import nodes_in_order
-from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Graph, Node
-from .factors import Factorizer, Term, factors_of, terms_of_sum
-from .reading_cost import reading_cost
+from ...math.scalar import cos, sin, sqrt
+from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Graph, Node, Symbol, nodes_in_order
+from .factors import Factorizer, Term, factors_of, reading_cost, symbol_count, terms_of_sum
 from .terms import (
     CONSTANT_ATOM,
     CONSTANT_TERM,
@@ -418,3 +426,229 @@ def merge_equal_terms(terms: list[Term]) -> list[Term]:
         else:
             found[key] = (total, p)
     return list(found.values())
+
+
+FULL_TURN = 2.0 * math.pi
+MAX_ANGLE_OPERATIONS = 300  # up to so many operations the cosine and sine of an angle are simplified
+MAX_FACTOR = 3  # largest factor of an angle in a sum
+
+ArctangentWave = tuple[Any, Any, list[Node]]
+"""Cosine and sine of an angle, each times factors, and the squares of these factors."""
+
+
+class ArctangentSubstitution:
+    """Replaces sines and cosines of arctangents and substitutes formulas; each node is processed once.
+
+    Parameters
+    ----------
+    definitions : sequence of (Node, Node, Node or None)
+        Symbol, its formula in earlier symbols, and, if it is atan2(y, x), sqrt(x^2 + y^2) if known.
+    """
+
+    def __init__(self, definitions: Iterable[tuple[Node, Any, Any]] = ()) -> None:
+        self._known: dict[int, Node] = {}
+        self._angles: dict[int, dict[Node, float]] = {}
+        self._waves: dict[int, ArctangentWave] = {}
+        for w, value, radius in definitions:
+            y = w.graph.node(value)
+            parts = self._parts(y)
+            if all(a.op in (SYMBOL, NUMBER, "atan2") for a in parts):
+                self._angles[w.index] = parts
+            if radius is not None and y.op == "atan2":
+                a, b, r = self([y.args[1], y.args[0], w.graph.node(radius)])
+                c, s = fast_simplification([w.graph.node(a / r), w.graph.node(b / r)])
+                self._waves[y.index] = (c, s, [])
+            self._known[w.index] = self([without_whole_turns(y)])[0]
+
+    def __call__(self, nodes: Sequence[Any]) -> list[Any]:
+        """Substitute all symbols that have a formula."""
+        for x in nodes_in_order(nodes):
+            if x.index not in self._known:
+                self._known[x.index] = self._constructed(x)
+        return [self._known[x.index] if isinstance(x, Node) else x for x in nodes]
+
+    def _constructed(self, x: Node) -> Node:
+        if x.op in ("sin", "cos"):
+            found = self._wave(x.args[0])
+            if found is not None:
+                return found[0] if x.op == "cos" else found[1]
+        args = tuple(self._known[a.index] for a in x.args)
+        same = all(a is b for a, b in zip(args, x.args, strict=True))
+        return x if same else x.graph.rebuilt(x, args)
+
+    def _parts(self, x: Node) -> dict[Node, float]:
+        """An angle as a sum of symbols and arctangents with factors, without whole turns."""
+        found: dict[Node, float] = {}
+        to_see = [(x, 1.0)]
+        while to_see:
+            y, c = to_see.pop()
+            if y.op == ADD:
+                to_see += [(a, c) for a in y.args]
+            elif y.op == MULTIPLY and y.args[0].op == NUMBER:
+                to_see.append((y.args[1], c * y.args[0].value))
+            elif y.index in self._angles:
+                to_see += [(a, c * n) for a, n in self._angles[y.index].items()]
+            elif y.op == NUMBER:
+                one = y.graph.number(1.0)
+                found[one] = found.get(one, 0.0) + c * y.value
+            elif not (y.op == "rounded" and abs(abs(c) / FULL_TURN - round(abs(c) / FULL_TURN)) < 1e-12):
+                found[y] = found.get(y, 0.0) + c
+        return {y: c for y, c in found.items() if c}
+
+    def _wave(self, angle: Node) -> tuple[Node, Node] | None:
+        """Cosine and sine of an angle that contains arctangents; None if it contains none."""
+        parts = self._parts(angle)
+        arcs = [(y, c) for y, c in parts.items() if y.op == "atan2"]
+        if not arcs or any(c != round(c) or abs(c) > MAX_FACTOR for _, c in arcs):
+            return None
+        g = angle.graph
+        rest: Any = 0.0
+        for y, c in parts.items():
+            if y.op != "atan2":
+                rest = rest + c * self([y])[0]
+        c, s = (cos(rest), sin(rest)) if isinstance(rest, Node) else (math.cos(rest), math.sin(rest))
+        squares: list[Node] = []
+        for y, n in arcs:
+            a, b, r = self._of(y)
+            for _ in range(abs(int(n))):
+                c, s = (c * a - s * b, s * a + c * b) if n > 0 else (c * a + s * b, s * a - c * b)
+                squares += r
+        under: Any = 1.0
+        for square, k in Counter(squares).items():
+            under = under * square ** (k // 2) * (sqrt(square) if k % 2 else 1.0)
+        made = fast_simplification([g.node(c / under), g.node(s / under)])
+        return made[0], made[1]
+
+    def _of(self, y: Node) -> ArctangentWave:
+        """Cosine and sine of an arctangent."""
+        if y.index not in self._waves:
+            b, a = fast_simplification(self(y.args))
+            self._waves[y.index] = (a, b, fast_simplification([a * a + b * b]))
+        return self._waves[y.index]
+
+
+def without_whole_turns(y: Node) -> Node:
+    """An angle without its term that counts whole turns."""
+    if y.op == ADD:
+        a, b = y.args
+        for one, other in ((a, b), (b, a)):
+            if one.op == MULTIPLY and one.args[0] == FULL_TURN and one.args[1].op == "rounded":
+                return other
+    return y
+
+
+def fast_simplification(nodes: Sequence[Node]) -> list[Node]:
+    """Simplify if that is quick; absolute values of parameters are resolved by the sign of their values."""
+    if len(nodes_in_order(nodes)) > MAX_ANGLE_OPERATIONS:
+        return list(nodes)
+    return without_absolute_values(simplified(list(nodes)))
+
+
+def without_absolute_values(nodes: Sequence[Any]) -> list[Any]:
+    """Resolve absolute values of expressions of parameters by the sign of their values."""
+    known: dict[int, Node] = {}
+    for x in nodes_in_order(nodes):
+        args = tuple(known[a.index] for a in x.args)
+        if x.op == "absolute" and not x.moving and x.args[0].op != NUMBER and x.value != 0.0:
+            known[x.index] = args[0] if x.args[0].value > 0.0 else -args[0]
+        else:
+            same = all(a is b for a, b in zip(args, x.args, strict=True))
+            known[x.index] = x if same else x.graph.rebuilt(x, args)
+    return [known[x.index] if isinstance(x, Node) else x for x in nodes]
+
+
+MIN_GAIN = 12.0  # a subexpression gets a name if that saves so many symbols
+LONG_COST = 60.0  # a factor or argument with so many symbols gets a name
+WRITTEN_OUT_COST = 4.0  # expressions up to this length are written out
+
+Definitions = list[tuple[Node, Node]]
+"""Symbols and their definitions, in an order of evaluation."""
+
+
+def extract_common_subexpressions(
+    nodes: Sequence[Any], gain: float = MIN_GAIN, long: float = LONG_COST
+) -> tuple[list[Any], Definitions]:
+    """Replace long parts that occur more than once by symbols.
+
+    Parameters
+    ----------
+    nodes : sequence of Node or number
+    gain, long : float
+        Symbols that a name must save; length above which a factor or an argument gets a name even if it occurs once.
+
+    Returns
+    -------
+    list, list of (Node, Node)
+        The expressions, and the definitions of the symbols.
+    """
+    order = [x for x in nodes_in_order(nodes) if x.op not in (NUMBER, SYMBOL)]
+    uses, inside = _uses(order)
+    lengths: dict[int, float] = {}
+    made: dict[int, Node] = {}
+    definitions: Definitions = []
+    letter = _symbol_letter(order[0].graph) if order else ""
+    for x in order:
+        args = tuple(made.get(a.index, a) for a in x.args)
+        new = made[x.index] = x if args == x.args else x.graph.rebuilt(x, args)
+        length = reading_cost(new, lengths)
+        saved = (uses[x.index] - 1) * (length - 1.0)
+        scaled = x.op == MULTIPLY and x.args[0].op == NUMBER
+        if length > WRITTEN_OUT_COST and not scaled and (saved > gain or (length > long and x.index in inside)):
+            name = f"{letter}_{len(definitions) + 1}"
+            index = f"{letter[0]}_{{{letter[1:]}{len(definitions) + 1}}}"
+            symbol = Symbol(name, "shared" if x.moving else "constant", index)
+            made[x.index] = x.graph.symbol(symbol, None if x.moving else x.value)
+            definitions.append((made[x.index], new))
+    return [made.get(x.index, x) if isinstance(x, Node) else x for x in nodes], definitions
+
+
+def _symbol_letter(graph: Graph) -> str:
+    """Letter of the symbols (w_1, w_2, ...) that no numbered symbol of the graph uses."""
+    taken = {x.data.name.partition("_")[0] for x in graph if x.op == SYMBOL and "_" in x.data.name}
+    return next(x for x in (*"wchkb", *(f"w{n}" for n in range(len(taken) + 1))) if x not in taken)
+
+
+def _uses(order: Sequence[Node]) -> tuple[dict[int, int], set[int]]:
+    """Number of uses of each operation; and the sums that occur in something other than a sum."""
+    uses: dict[int, int] = defaultdict(int)
+    inside: set[int] = set()
+    for x in order:
+        scaled = x.op == MULTIPLY and x.args[0].op == NUMBER
+        for a in x.args:
+            uses[a.index] += 1
+            if x.op != ADD and not scaled and a.op == ADD:
+                inside.add(a.index)
+    return uses, inside
+
+
+MAX_OPERATIONS = 600  # up to so many operations expressions are simplified before parts get names
+READABLE_COST = 2500.0  # that result is kept up to so many symbols in all expressions
+
+
+def simplified_with_symbols(
+    nodes: Sequence[Any], units: Sequence[Sequence[Node]] = ()
+) -> tuple[list[Any], Definitions]:
+    """Short expressions of the same value, with symbols for common subexpressions and their definitions.
+
+    Small expressions are simplified as a whole. In large ones common subexpressions get names first, and each piece is
+    simplified by itself: the time is proportional to the number of operations, and the result does not grow.
+
+    Parameters
+    ----------
+    nodes : sequence of Node or number
+    units : sequence of sequences of Node
+        As for `simplified`.
+
+    Returns
+    -------
+    list, list of (Node, Node)
+        The expressions, and symbols with their definitions, in an order of evaluation.
+    """
+    if len(nodes_in_order(nodes)) <= MAX_OPERATIONS:
+        found = simplified(nodes, units)
+        if symbol_count(found) <= READABLE_COST:
+            return extract_common_subexpressions(found)
+    rest, definitions = extract_common_subexpressions(nodes)
+    short = simplified([*rest, *(y for _, y in definitions)], units)
+    count = len(rest)
+    return short[:count], [(x, y) for (x, _), y in zip(definitions, short[count:], strict=True)]

@@ -16,7 +16,7 @@ from .contact_problem import (
     LIMIT_REACHED,
     SOLVE_FAILED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -182,7 +182,7 @@ def admm_solve(P, X, O, F):
 
 @kernel
 def admm(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Alternating directions; returns iterations. For the outcomes in O.count.ended see `newton.newton`."""
     return admm_solve(P, X, O, F)

@@ -15,7 +15,7 @@ from .contact_problem import (
     CONVERGED,
     LIMIT_REACHED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -79,7 +79,7 @@ def initial_lipschitz(P, X, W, O, many):
 
 @kernel
 def apgd(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Iterate until a step changes velocities by less than O.real.enough, or O.count.most times. Returns iterations."""
     return accelerated_gradient(P, X, W, O, -1.0, (True, 2.0, 0.9, 1.0 + 1e-9))
@@ -87,7 +87,7 @@ def apgd(
 
 @kernel
 def scaled_apgd(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Iterate in the metric of the diagonal blocks; arguments and result as `apgd`.
 

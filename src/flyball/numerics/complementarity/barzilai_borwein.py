@@ -17,7 +17,7 @@ from .contact_problem import (
     LIMIT_REACHED,
     SOLVE_FAILED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -65,7 +65,7 @@ def spectral_step(dd, curved, square, odd):
 
 @kernel
 def barzilai_borwein(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Iterate until a step changes velocities by less than O.real.enough, or O.count.most times. Returns iterations.
 

@@ -58,7 +58,7 @@ class ContactProblem(NamedTuple):
     line_p: Int1  # (ni + 1,): first line of each island (an island may have lines and no contacts)
 
 
-class ContactState(NamedTuple):
+class ContactSolution(NamedTuple):
     """Impulses and velocities. On entry: warm start and velocities without any impulse; on exit: the solution."""
 
     p: Float2  # (nc, 3)
@@ -257,7 +257,7 @@ def cache_aligned(rows: int, columns: int) -> np.ndarray:
 
 def allocate_solver(
     P: ContactProblem, history: int = 0
-) -> tuple[ContactState, ContactWorkspace, SolverSettings, FactorStorage]:
+) -> tuple[ContactSolution, ContactWorkspace, SolverSettings, FactorStorage]:
     """Allocate state, workspace, settings and an empty factor storage for a problem.
 
     Parameters
@@ -272,7 +272,7 @@ def allocate_solver(
         The state is zero. Settings: all islands, at most 100 iterations, tolerance 1e-6 m/s, convex form.
     """
     nc, nn, nl, nw = len(P.mu), len(P.node), len(P.line_at), int(P.group[-1])
-    X = ContactState(np.zeros((nc, 3)), np.zeros((len(P.turn), 3)), np.zeros(nl), np.zeros((nn, 8)), np.zeros(nw))
+    X = ContactSolution(np.zeros((nc, 3)), np.zeros((len(P.turn), 3)), np.zeros(nl), np.zeros((nn, 8)), np.zeros(nw))
     W = ContactWorkspace(
         rows=np.zeros((17, nc, 3)),
         nodes=np.zeros((6, nn, 8)),
@@ -294,7 +294,7 @@ def allocate_solver(
 
 
 def solve_contacts(
-    solver: Kernel, P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage
+    solver: Kernel, P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage
 ) -> int:
     """Solve a contact problem in place.
 

@@ -28,7 +28,7 @@ from .contact_problem import (
     LIMIT_REACHED,
     SOLVE_FAILED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -124,7 +124,7 @@ def prepare_pyramids(P, X, W, O):
 
 @kernel
 def pyramid(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Sweep until velocities change by less than O.real.enough, or O.count.most times. Returns sweeps.
 

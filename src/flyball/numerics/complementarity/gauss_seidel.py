@@ -39,7 +39,7 @@ from .contact_problem import (
     CONVERGED,
     LIMIT_REACHED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -373,7 +373,7 @@ def prepare_sweeps(P, X, W, O):
 
 @kernel
 def gauss_seidel(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Sweep until velocities change by less than O.real.enough, at most O.count.most times; returns the sweeps."""
     many = prepare_sweeps(P, X, W, O)

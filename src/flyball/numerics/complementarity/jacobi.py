@@ -16,7 +16,7 @@ from .contact_problem import (
     FIXED_SIDE,
     LIMIT_REACHED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -85,7 +85,7 @@ def split_masses(P, W, O, many):
 
 @kernel
 def jacobi(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Iterate until velocities change by less than O.real.enough, or O.count.most times. Returns iterations."""
     many = begin_iterations(P, X, W, O, False)

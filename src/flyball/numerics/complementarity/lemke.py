@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from .contact_operator import apply_contact_impulse, apply_line_impulse, contact_velocity, line_velocity
-from .contact_problem import ContactProblem, ContactState
+from .contact_problem import ContactProblem, ContactSolution
 
 MAX_UNKNOWNS = 2000  # maximum number of unknowns: takes seconds
 PIVOT_TOLERANCE = 1e-11  # relative to the largest entry of the column; smaller pivots count as zero
@@ -92,7 +92,7 @@ def _read_solution(T: np.ndarray, basis: np.ndarray, n: int) -> np.ndarray:
     return z
 
 
-def delassus(P: ContactProblem, X: ContactState) -> tuple[np.ndarray, np.ndarray]:
+def delassus(P: ContactProblem, X: ContactSolution) -> tuple[np.ndarray, np.ndarray]:
     """Compute N and b as dense arrays: impulses contact by contact, then lines; without rolling friction."""
     nc, nl = int(P.size[0]), int(P.size[3])
     v, wide = np.zeros_like(X.v), np.zeros_like(X.wide)
@@ -115,7 +115,7 @@ def delassus(P: ContactProblem, X: ContactState) -> tuple[np.ndarray, np.ndarray
     return N, velocities(X.v, X.wide) + np.concatenate([P.bias[:nc].ravel(), P.line_law.bias[:nl]])
 
 
-def pyramid_by_lemke(P: ContactProblem, X: ContactState, directions: int = 8) -> None:
+def pyramid_by_lemke(P: ContactProblem, X: ContactSolution, directions: int = 8) -> None:
     """Solve contacts with friction pyramids by pivoting; writes impulses and velocities to X.
 
     Parameters

@@ -20,7 +20,7 @@ from .contact_problem import (
     SOLVE_FAILED,
     STALLED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     FactorStorage,
     SolverSettings,
@@ -342,7 +342,7 @@ def newton_solve(P, X, O, F):
 
 @kernel
 def newton(
-    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Newton's method; returns the number of factorisations.
 

@@ -213,21 +213,14 @@ def allocate_guard_state(
     """
     ng, real = len(way), GuardReals.blank()
     real.latest = -np.inf
-    kept, met = (np.array(x, np.int64) for x in sampled_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
     guards = GuardValues.blank(ng + terms)
     guards[:] = np.nan
     guards.start_rounding = guards.end_rounding = 0.0
     return GuardState(
-        way=np.array(way, np.int64),
-        nonnegative=(np.asarray(holding) > 0).astype(np.int64),
-        no_deeper=(np.asarray(holding) > 1).astype(np.int64),
-        grain=np.zeros(ng),
-        least=np.zeros(ng),
-        tied=np.zeros(ng),
+        **_arrays_of_guards(way, holding),
+        **_arrays_of_stages(c, stages, ng + terms, len(rows) + len(spots)),
         still=np.zeros(measured),
-        side=np.full(ng, UNKNOWN_SIDE),
-        fired=np.zeros(ng, np.int64),
         guards=guards,
         node_values=np.full((NODES + CHECK_NODES, ng + terms), np.nan),
         polynomial=np.zeros(NODES),
@@ -236,18 +229,40 @@ def allocate_guard_state(
         checks=check_weights(),
         real=real,
         count=GuardCounts.blank(),
-        stages=kept,
-        compared_stages=met,
-        compared_places=c[met],
-        compared_values=np.full((len(met), ng + terms), np.nan),
         moving=np.zeros((2, 3, measured)),
-        levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
-        places=np.r_[0.0, c[kept], 1.0],
         rows=np.array(rows, np.int64),
         sensed_places=spots,
         sensed=expected[0],
         lam=expected[1],
     )
+
+
+def _arrays_of_guards(way: np.ndarray, holding: np.ndarray) -> dict[str, np.ndarray]:
+    """Arrays of `GuardState` with one entry for each guard."""
+    ng = len(way)
+    return {
+        "way": np.array(way, np.int64),
+        "nonnegative": (np.asarray(holding) > 0).astype(np.int64),
+        "no_deeper": (np.asarray(holding) > 1).astype(np.int64),
+        "grain": np.zeros(ng),
+        "least": np.zeros(ng),
+        "tied": np.zeros(ng),
+        "side": np.full(ng, UNKNOWN_SIDE),
+        "fired": np.zeros(ng, np.int64),
+    }
+
+
+def _arrays_of_stages(c: np.ndarray, stages: int, guards: int, levels: int) -> dict[str, np.ndarray]:
+    """Arrays of `GuardState` with one entry for each stage at which levels are stored or guards are compared."""
+    kept, met = (np.array(x, np.int64) for x in sampled_stages(c, stages))
+    return {
+        "stages": kept,
+        "compared_stages": met,
+        "compared_places": c[met],
+        "compared_values": np.full((len(met), guards), np.nan),
+        "levels": np.zeros((2 + len(kept), levels)),
+        "places": np.r_[0.0, c[kept], 1.0],
+    }
 
 
 POLYNOMIAL_TOLERANCE = 1e-2  # largest prediction error of a guard, relative to its change over a step

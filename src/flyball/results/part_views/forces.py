@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import BY_RATE, HELD
+from ...constraints.switches.switch_kind import BY_RATE, HELD
 from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
 from ...errors import AnalysisError
@@ -16,9 +16,9 @@ from ...laws.interval_evaluation import evaluate_over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
-from ..event_driven_contacts import ContactHistory
-from ..phases import RecordedModes, stored_reference
-from ..recorded_kinematics import coordinate_records
+from ..contacts import ContactHistory
+from ..events import RecordedModes, stored_reference
+from ..motion_record import coordinate_records
 from .base import Curves, PartView
 
 

@@ -14,7 +14,7 @@ from ...model.body import GROUND
 from ...model.controller_signals import signal_law
 from ...model.messages import listing, suggest
 from ...tables.forest import coordinate_row
-from ..recorded_kinematics import FULL_TURN, Wrench, measured_coordinate
+from ..motion_record import FULL_TURN, Wrench, measured_coordinate
 from .base import PartView, components_array
 
 if TYPE_CHECKING:

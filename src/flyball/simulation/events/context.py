@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...assembly.compiled_mechanism import CompiledMechanism
-from ...constraints.switches.guard_kinds import FROZEN, HELD, OFF
+from ...constraints.switches.switch_kind import FROZEN, HELD, OFF
 from ...engine.entry_point import MOTION, evaluate_state
 from ...engine.guards import ForceDistribution, empty_distribution
 from ...errors import SimulationError

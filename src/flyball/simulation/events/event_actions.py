@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import HELD
+from ...constraints.switches.switch_kind import HELD
 from ...engine.kinematics import store_ground_frames, twist_column
 from ...errors import FlyballError, SimulationError
 from ...model.body import Body, Frame

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import (
+from ...constraints.switches.switch_kind import (
     DISTANCE_GUARDS,
     FORCE_GUARDS,
     G_BACK,
@@ -44,10 +44,10 @@ from ...numerics.integrators import time_loop as ex
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...progress import ReportProgress
-from ...results.phases import Phase, RecordedModes, event_energies, phases_or_none
+from ...results.events import Phase, RecordedModes, event_energies, phases_or_none
 from ...results.result import Result
 from ...tables.table_definitions import assign
-from ..implicit.integrators import implicit_integrator
+from ..implicit_integrators import implicit_integrator
 from ..integration_intervals import IMPLICIT_STEP_WEIGHT, SegmentEnd, SmoothIntervals, known_breaks, sampling
 from ..integration_options import Integration
 from ..method_choice import IMPLICIT_METHODS, explicit_substitute

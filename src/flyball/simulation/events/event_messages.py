@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import BY_RATE, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF
-from ...constraints.switches.switch_kind import DISC, ONE_SIDED
+from ...constraints.switches.switch_kind import BY_RATE, DISC, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF, ONE_SIDED
 from ...errors import ModelError
 from ...model.contact_point import Touch
 from ...model.joint import Joint
@@ -16,7 +15,7 @@ from ...results.events import EventRecord
 from ...results.reactions import EventImpulses
 from ..diagnosis import InitialOverlap, UnresolvedInstant, body_names, jam_message
 from .context import value_in_words
-from .impacts import Jump
+from .impacts import VelocityJump
 from .instant_problem import InstantProblem, ProblemRow
 from .mode_selection import ModeDecision, element_titles
 
@@ -162,7 +161,7 @@ def transition_words(n: InstantProblem, s: int, held: bool) -> tuple[str, str]:
     return n.kinds[s].closing if held else n.kinds[s].opening
 
 
-def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
+def record_jump(n: InstantProblem, jumped: VelocityJump, before: np.ndarray) -> None:
     """Record a jump of velocities."""
     if not (jumped.closing or jumped.external_impulses or jumped.given or jumped.jammed):
         return
@@ -247,7 +246,7 @@ def append_record(
     names: str,
     kind: str,
     done: tuple[str, ...],
-    jumped: Jump | None,
+    jumped: VelocityJump | None,
     impulses: dict,
     before: np.ndarray,
 ) -> None:

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import G_SHARED, OFF
-from ...constraints.switches.switch_kind import DISC, INTERVAL
+from ...constraints.switches.switch_kind import DISC, G_SHARED, INTERVAL, OFF
 from ...engine.guards import GROUP_ROUNDING
 from ...engine.mode_complementarity import FORCES, IMPULSE_STEP
 from ...numerics.complementarity.dense_problem import (

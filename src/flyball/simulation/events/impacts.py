@@ -26,7 +26,7 @@ REST_RATE = 1e-12  # part of its terms below which a rate after the jump counts 
 
 
 @dataclass
-class Jump:
+class VelocityJump:
     """The effects of a velocity jump.
 
     Attributes
@@ -67,7 +67,7 @@ def violates_rule(n: InstantProblem, parts: list[ProblemRow], rate: np.ndarray) 
     return False
 
 
-def apply_impulses(n: InstantProblem, parts: list[ProblemRow], kick: np.ndarray | None) -> Jump:
+def apply_impulses(n: InstantProblem, parts: list[ProblemRow], kick: np.ndarray | None) -> VelocityJump:
     """Change the velocities of the motion by the impulses of these rows; see the module."""
     B, P, _ = n.problem(parts)
     out = no_jump(n)
@@ -93,9 +93,9 @@ def apply_velocities(
     solved: tuple[ModeProblem, DenseProblem],
     parts: list[ProblemRow],
     found: tuple[np.ndarray, np.ndarray, np.ndarray],
-    out: Jump,
+    out: VelocityJump,
     drive: np.ndarray,
-) -> Jump:
+) -> VelocityJump:
     """Apply impulses x, which change the rows' rates from ``before`` to u, to the velocities of the motion."""
     B, P = solved
     before, x, u = found
@@ -115,7 +115,7 @@ def apply_velocities(
     return out
 
 
-def add_impulses(n: InstantProblem, out: Jump, B: ModeProblem, x: np.ndarray) -> None:
+def add_impulses(n: InstantProblem, out: VelocityJump, B: ModeProblem, x: np.ndarray) -> None:
     """Add further impulses to those of a jump; the velocities include them already."""
     S, nr = n.S, len(n.S.rows.law)
     out.rows[:nr] += x @ B.L
@@ -125,13 +125,13 @@ def add_impulses(n: InstantProblem, out: Jump, B: ModeProblem, x: np.ndarray) ->
         out.impulse[s] = out.impulse.get(s, 0.0) + more
 
 
-def no_jump(n: InstantProblem) -> Jump:
+def no_jump(n: InstantProblem) -> VelocityJump:
     """Return a jump without effect."""
-    return Jump(rows=np.zeros(len(n.S.rows.law)), along=np.zeros(n.here.structure.nv))
+    return VelocityJump(rows=np.zeros(len(n.S.rows.law)), along=np.zeros(n.here.structure.nv))
 
 
 def external_impulse_response(
-    n: InstantProblem, kick: np.ndarray, out: Jump, B: ModeProblem, drive: np.ndarray
+    n: InstantProblem, kick: np.ndarray, out: VelocityJump, B: ModeProblem, drive: np.ndarray
 ) -> np.ndarray:
     """Return the change of the rows' rates by an applied generalised impulse alone; add its effects to ``out``."""
     dv, rows, effort = n.response(kick)
@@ -180,7 +180,7 @@ def poisson_expansion(
     return P.x + least, P.u - u
 
 
-def account_for_drivers(n: InstantProblem, out: Jump, drive: np.ndarray) -> None:
+def account_for_drivers(n: InstantProblem, out: VelocityJump, drive: np.ndarray) -> None:
     """Append the impulses of drivers to those of the rows, and add their works at the prescribed rates."""
     S, W, y, rows = n.S, n.W, n.here.y, out.rows
     for s, x in out.impulse.items():
@@ -212,7 +212,7 @@ class BounceSeries:
     over: float = np.nan
 
 
-def note_bounces(n: InstantProblem, jumped: Jump) -> None:
+def note_bounces(n: InstantProblem, jumped: VelocityJump) -> None:
     """Count the impacts of this jump in the series of their stops."""
     t = n.here.t
     for s in jumped.closing.keys() - n.here.missed_crossings:
@@ -246,7 +246,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
     return over
 
 
-def settle_down(n: InstantProblem, over: list[int], still: np.ndarray, jumped: Jump | None) -> None:
+def settle_down(n: InstantProblem, over: list[int], still: np.ndarray, jumped: VelocityJump | None) -> None:
     """Set the rates of switches that bounce no more to zero; mark friction that moved by these alone as at rest in
     ``still``.
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from ...compiler.kernels import BoundKernel, StructBuffer
 from ...constraints.switches.contact_slip import EDGE
-from ...constraints.switches.guard_kinds import (
+from ...constraints.switches.switch_kind import (
+    DISC,
     G_BACK,
     G_CONE,
     G_LOWER,
@@ -27,9 +28,13 @@ from ...constraints.switches.guard_kinds import (
     G_TURNS,
     G_UPPER,
     HELD,
+    INTERVAL,
+    NO_ROW,
+    NOT_IN_USE,
     OFF,
+    ProblemRow,
+    SwitchKind,
 )
-from ...constraints.switches.switch_kind import DISC, INTERVAL, NO_ROW, NOT_IN_USE, ProblemRow, SwitchKind
 from ...engine.calls import ARRIVE, GUARD_VALUES, MOTION, SOLVE, OutputBuffer
 from ...engine.entry_point import engine
 from ...engine.guards import margin_kernel

@@ -10,8 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import FORCE_GUARDS, G_BACK, G_HOLDS, G_LOWER, G_PULL, G_UPPER, HELD, OFF
-from ...constraints.switches.switch_kind import INTERVAL, NO_ROW, ONE_SIDED, ProblemRow
+from ...constraints.switches.switch_kind import (
+    FORCE_GUARDS,
+    G_BACK,
+    G_HOLDS,
+    G_LOWER,
+    G_PULL,
+    G_UPPER,
+    HELD,
+    INTERVAL,
+    NO_ROW,
+    OFF,
+    ONE_SIDED,
+    ProblemRow,
+)
 from ...engine.calls import MOTION
 from ...engine.integration_loop import GuardedLoop
 from ...engine.loads import SLOPES_UNKNOWN

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constraints.switches.guard_kinds import G_CORNER, HELD, OFF, STEADY
+from ...constraints.switches.switch_kind import G_CORNER, HELD, OFF, STEADY
 from ...engine.calls import MOTION
 from ...engine.guards import corner_value
 from ...engine.mode_complementarity import RATE_ROUNDING, VELOCITY_ROUNDING
@@ -31,7 +31,7 @@ PASSAGES_OF_SERIES = 4  # passages through a corner that show whether oscillatio
 CONVERGING_RATIO = 0.999  # largest ratio of successive pairs of oscillations of a converging series
 
 
-class Corner(NamedTuple):
+class CornerFunction(NamedTuple):
     """A function u on whose sign a law depends, at the state last evaluated.
 
     Attributes
@@ -61,7 +61,7 @@ def corner_derivatives(n: InstantProblem, s: int, seed: int) -> tuple[float, flo
     return evaluate_jet(n.S.code, n.S.const, law, n.W.stack, n.here.t, n.W.sensed, seed)
 
 
-def corner_at(n: InstantProblem, s: int) -> Corner:
+def corner_at(n: InstantProblem, s: int) -> CornerFunction:
     """Return the corner of switch s."""
     S, W, v = n.S, n.W, n.here.v
     nm, nr = count_measured(S), len(S.rows.law)
@@ -81,7 +81,7 @@ def corner_at(n: InstantProblem, s: int) -> Corner:
             initial=0.0
         )
         still += abs(slope) * (RATE_TOLERANCE * unit * n.pace + rounding)
-    return Corner(row, rates, size * n.pace if rates else size, still, still if rates else LOW_FLIGHT * size)
+    return CornerFunction(row, rates, size * n.pace if rates else size, still, still if rates else LOW_FLIGHT * size)
 
 
 def note_passage(n: InstantProblem, s: int) -> None:

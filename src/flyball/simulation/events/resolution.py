@@ -13,7 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...constraints.switches.elastic_stop import pressed_side
-from ...constraints.switches.guard_kinds import (
+from ...constraints.switches.switch_kind import (
+    DISC,
     FORCE_GUARDS,
     FROZEN,
     G_CORNER,
@@ -26,7 +27,6 @@ from ...constraints.switches.guard_kinds import (
     PRESS_GUARDS,
     RATE_GUARDS,
 )
-from ...constraints.switches.switch_kind import DISC
 from ...engine.mode_complementarity import STEP_IMPULSES, SUDDEN_IMPULSES, TERM_ROUNDING
 from ...model.contact_point import Touch
 from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, NO_IMPULSE, NO_SOLUTION, SOLUTION_FOUND
@@ -45,7 +45,7 @@ from .event_messages import (
     start_beyond_bound,
 )
 from .impacts import (
-    Jump,
+    VelocityJump,
     apply_impulses,
     apply_velocities,
     coming_to_rest,
@@ -161,7 +161,7 @@ def _friction_is_needless(n: InstantProblem, found: ModeDecision, rows: list[int
     return n.again(P) == SOLUTION_FOUND and bool(np.abs(P.u - found.u).max() <= DIFFERENT_SOLUTION * size)
 
 
-def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: float) -> Jump | None:
+def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: float) -> VelocityJump | None:
     """Return the velocity jump without a collision for rows without solution for the accelerations; None if there is
     none.
 
@@ -313,7 +313,9 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
             still[list(jumped.at_rest)] = True
         update_elastic_stops(n, fired, ways)
         found = modes_or_jump(n, at, still, fired, jumped)
-        if isinstance(found, Jump):  # no solution for the accelerations: velocities have jumped, all is evaluated again
+        if isinstance(
+            found, VelocityJump
+        ):  # no solution for the accelerations: velocities have jumped, all is evaluated again
             record_jump(n, found, since)
             since = here.y.copy()
             n.reevaluate_switches()
@@ -364,7 +366,7 @@ def guards_still_valid(n: InstantProblem, fired: np.ndarray, rate: np.ndarray) -
     )
 
 
-def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
+def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> VelocityJump | None:
     """Return the jump of velocities, or None if there is none; ``n`` is evaluated afterwards."""
     here = n.here
     parts = rows_of_velocities(n, at, still)
@@ -384,8 +386,12 @@ def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
 
 
 def modes_or_jump(
-    n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray, jumped: Jump | None
-) -> ModeDecision | Jump:
+    n: InstantProblem,
+    at: dict[int, tuple[float, ...]],
+    still: np.ndarray,
+    fired: np.ndarray,
+    jumped: VelocityJump | None,
+) -> ModeDecision | VelocityJump:
     """Decide the modes; end series of bounces that have become shorter than rounding.
 
     Where there is no solution for the accelerations, velocities may jump without a collision.

@@ -39,7 +39,7 @@ from ...numerics.complementarity.contact_operator import (
     to_world_frame,
 )
 from ...tables.table_definitions import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
-from .compliant_contact import contact_stiffness
+from .contact_laws import contact_stiffness
 from .free_bodies import rest_speed, speed_of_fall
 from .stepping_tables import (
     MIDDLE_FOUND,

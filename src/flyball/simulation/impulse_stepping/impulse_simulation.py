@@ -14,7 +14,7 @@ import numpy as np
 from ...assembly.assembled_state import Assembly
 from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ...assembly.positions_and_velocities import described_velocities
-from ...compiler.announcements import compiled_since
+from ...compiler.object_files import compiled_since
 from ...errors import AnalysisError, SimulationError
 from ...math.vec import mtv, quaternion_matrix
 from ...mobility.mobility import mobility
@@ -23,11 +23,11 @@ from ...model.model import Model
 from ...numerics.complementarity.solver_choice import OTHER_SOLVED, PASSED_ON, SMALL_SOLVED
 from ...progress import ReportProgress
 from ...results import diagnostics
-from ...results.body_sets import BodySetMotion
 from ...results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
 from ...results.energy_balance import CONTACT_ELASTIC, EXCHANGE_SIGNS
 from ...results.health import ContactHealth, Health
 from ...results.motion_record import record_motion
+from ...results.part_views.bodies import BodySetMotion
 from ...results.result import Result
 from ...tables.contact_tables import ContactTables, contact_tables
 from ...tables.reference_configuration import BodyState
@@ -35,18 +35,20 @@ from ..integration_intervals import PAUSED_MESSAGE, Segment, whole_motion
 from ..integration_options import Stepping
 from .setup import (
     MechanismMotion,
+    StepSize,
     assembled_start,
+    choose_step,
     make_stepper,
     movers_of_assembly,
     partition_bodies,
     place_body_sets,
     place_movers,
     separate_mechanism,
+    smallest_radius,
     values_with_stops,
     with_earlier_energy,
 )
 from .step_loop import solver_counts
-from .step_size import StepSize, choose_step, smallest_radius
 from .stepper import ImpulseStepper, NoSolution
 from .stepping_tables import (
     RunSums,
@@ -298,7 +300,7 @@ MOST_STEPS_PER_CALL, CALL_SECONDS = (
 )  # steps between two progress reports, and their largest duration
 
 
-class ImpulseMotion(NamedTuple):
+class ImpulseStart(NamedTuple):
     """A motion by impulse time stepping at its start."""
 
     base: Assembly
@@ -310,7 +312,7 @@ class ImpulseMotion(NamedTuple):
 
 def begin_by_impulses(
     model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, before: Result | None = None
-) -> ImpulseMotion:
+) -> ImpulseStart:
     """Return the motion of a model at time t, as described or at the end of an earlier result.
 
     Raises
@@ -333,7 +335,7 @@ def begin_by_impulses(
         place_body_sets(scene, at, before)
     chosen = choose_step(o, scene, at, values, held.start if held else None, before.health if before else None)
     try:
-        return ImpulseMotion(base, scene, make_stepper(scene, at, values, o, chosen, held), held, chosen)
+        return ImpulseStart(base, scene, make_stepper(scene, at, values, o, chosen, held), held, chosen)
     except NoSolution:
         raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
 

@@ -11,7 +11,7 @@ numerical.
 
 from __future__ import annotations
 
-from ...collision.tables import Contacts, Movers
+from ...collision.tables import ContactTable, Movers
 from ...compiler.formulas import call, formula
 from ...compiler.kernels import kernel
 from ...engine.calls import ARRIVE, MOTION, POSITION, SOLVE
@@ -19,19 +19,22 @@ from ...engine.kinematics import retract
 from ...engine.rows import row_times
 from ...math.scalar import sqrt
 from ...math.vec import dot, load3, load9, mtv, mv, store3, store9
-from ...numerics.complementarity.contact_problem import ContactProblem, ContactState
+from ...numerics.complementarity.contact_problem import ContactProblem, ContactSolution
 from ...tables.table_definitions import SCHUR
-from .implicit_springs import (
+from .mechanism_rows import (
+    account_lines,
     correct_spring_lengths,
     dot_rows,
     find_implicit_springs,
     impulse_response,
+    keep_stops_only,
+    mechanism_contact_rows,
     save_spring_biases,
     save_spring_lengths,
     spring_impulse,
+    update_friction_loads,
     with_spring_response,
 )
-from .mechanism_rows import account_lines, keep_stops_only, mechanism_contact_rows, update_friction_loads
 from .stepping_tables import (
     NOT_CONVERGED,
     TASK_APPLY_IMPULSES,
@@ -538,7 +541,9 @@ def finish_step(A, M, X):
 
 
 @kernel
-def mechanism_kernel(A: MechanismTables, M: Movers, C: Contacts, P: ContactProblem, X: ContactState, task: int) -> int:
+def mechanism_kernel(
+    A: MechanismTables, M: Movers, C: ContactTable, P: ContactProblem, X: ContactSolution, task: int
+) -> int:
     """Run a task of the jointed mechanism ``A`` with movers, contacts, problem and state of the step.
 
     Tasks: see `stepping_tables`. Returns 0, TABLES_FULL, or the engine's status.

@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...collision.broad_phase.workspace import Search
 from ...collision.contact_search import MIDWAY, NEW_VELOCITIES
 from ...collision.contact_search import STEP as STEP_ON
 from ...collision.tables import (
     DONE,
     FULL_CONTACTS,
-    Contacts,
+    ContactTable,
     Geometry,
     Movers,
+    Search,
 )
 from ...compiler.formulas import call, formula
 from ...compiler.kernels import kernel
@@ -27,23 +27,12 @@ from ...numerics.complementarity.contact_operator import apply_contact_impulse, 
 from ...numerics.complementarity.contact_problem import (
     CONVERGED,
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     SolverSettings,
 )
 from ...numerics.complementarity.solver_choice import SMALL_ISLAND_SOLVER, IslandSolver, prepare_solver
 from ...tables.table_definitions import Surfaces
-from .compliant_contact import (
-    FEW_LAW_ITERATIONS,
-    LAW_ITERATIONS,
-    find_compliant_contacts,
-    law_is_met,
-    linearise_compliant_rows,
-    remaining_gap,
-    restore_free_velocities,
-    start_compliant_rows,
-    store_elastic_energy,
-)
 from .contact_constraints import (
     account_contact,
     account_rolling,
@@ -59,6 +48,21 @@ from .contact_constraints import (
     static_friction_of_sticking,
     warm_start,
 )
+from .contact_laws import (
+    FEW_LAW_ITERATIONS,
+    IMPACT_ROUNDS,
+    LAW_ITERATIONS,
+    clear_impact_impulses,
+    find_compliant_contacts,
+    find_impacts,
+    law_is_met,
+    linearise_compliant_rows,
+    remaining_gap,
+    resolve_impacts,
+    restore_free_velocities,
+    start_compliant_rows,
+    store_elastic_energy,
+)
 from .free_bodies import (
     clear_velocities,
     displace_bodies,
@@ -66,7 +70,6 @@ from .free_bodies import (
     start_from_free_velocities,
     velocities_without_contact,
 )
-from .restitution import IMPACT_ROUNDS, clear_impact_impulses, find_impacts, resolve_impacts
 from .stepping_tables import (
     MIDDLE_FOUND,
     NO_SOLUTION,
@@ -81,10 +84,10 @@ from .stepping_tables import (
     TASK_MEAN_VELOCITIES,
     TASK_POSES,
     TASK_ROWS,
-    ContactHistory,
     FreeBodies,
     MechanismTables,
-    RunState,
+    SteppingState,
+    StoredContacts,
 )
 from .stepping_tables import TASK_FINAL_VELOCITIES as VELOCITIES_AFTER
 
@@ -100,10 +103,10 @@ class StepSolvers(NamedTuple):
 def bind_solvers(
     name: str,
     problems: tuple[ContactProblem, ContactProblem, ContactProblem],
-    X: ContactState,
+    X: ContactSolution,
     W: ContactWorkspace,
     O: SolverSettings,
-    state: RunState,
+    state: SteppingState,
 ) -> StepSolvers:
     """Bind a solver for velocities, positions and impacts; its addresses are stored in ``state.addresses``."""
     found = [prepare_solver(name, P, X, W, O) for P in problems]
@@ -517,25 +520,25 @@ def step_loop_kernel(
     G: Geometry,
     A: MechanismTables,
     M: Movers,
-    C: Contacts,
-    D: Contacts,
-    H: Contacts,
+    C: ContactTable,
+    D: ContactTable,
+    H: ContactTable,
     B: Search,
     P: ContactProblem,
     Q: ContactProblem,
     R: ContactProblem,
-    X: ContactState,
-    Y: ContactState,
-    Z: ContactState,
-    E: ContactState,
+    X: ContactSolution,
+    Y: ContactSolution,
+    Z: ContactSolution,
+    E: ContactSolution,
     W: ContactWorkspace,
     O: SolverSettings,
     F: StepSolvers,
     N: FreeBodies,
     L: Surfaces,
-    state: RunState,
-    T: ContactHistory,
-    U: ContactHistory,
+    state: SteppingState,
+    T: StoredContacts,
+    U: StoredContacts,
 ) -> int:
     """Take ``state.counts.steps_left`` steps. Returns a status: of the contact search, TABLES_FULL, NO_SOLUTION or
     STEP_TOO_LONG.

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...collision.contact_finder import ContactFinder
-from ...collision.tables import DONE, Contacts, Geometry, Movers
+from ...collision.tables import DONE, ContactTable, Geometry, Movers
 from ...compiler.kernels import StructBuffer, check_layout
 from ...engine.entry_point import engine
 from ...numerics.complementarity.contact_problem import (
     ContactProblem,
-    ContactState,
+    ContactSolution,
     ContactWorkspace,
     Nodes,
     SolverSettings,
@@ -30,13 +30,13 @@ from .stepping_tables import (
     STEP_TOO_LONG,
     TABLES_FULL,
     TASK_START,
-    ContactHistory,
     ContactMemory,
     FreeBodies,
     FreeBodyNumbers,
     Jobs,
     MechanismTables,
-    RunState,
+    SteppingState,
+    StoredContacts,
     no_mechanism,
 )
 
@@ -65,15 +65,15 @@ class StepWorkspaces:
     P: ContactProblem
     Q: ContactProblem
     R: ContactProblem
-    X: ContactState
-    Y: ContactState
-    Z: ContactState
-    E: ContactState
+    X: ContactSolution
+    Y: ContactSolution
+    Z: ContactSolution
+    E: ContactSolution
     W: ContactWorkspace
     O: SolverSettings
     F: StepSolvers
-    T: ContactHistory
-    U: ContactHistory
+    T: StoredContacts
+    U: StoredContacts
 
 
 def make_workspaces(
@@ -81,7 +81,7 @@ def make_workspaces(
     node: Nodes,
     turning: bool,
     A: MechanismTables,
-    state: RunState,
+    state: SteppingState,
     solver: str,
     old: StepWorkspaces | None = None,
 ) -> StepWorkspaces:
@@ -104,7 +104,7 @@ def make_workspaces(
         for a, b in zip(kept, (old.T.memory, old.U.memory), strict=True):
             a[: len(b)] = b
         solver_counts(F)[:] += solver_counts(old.F)
-    return StepWorkspaces(P, Q, R, X, Y, Z, E, W, O, F, ContactHistory(kept[0]), ContactHistory(kept[1]))
+    return StepWorkspaces(P, Q, R, X, Y, Z, E, W, O, F, StoredContacts(kept[0]), StoredContacts(kept[1]))
 
 
 def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> FreeBodies:
@@ -147,7 +147,7 @@ class SavedState(NamedTuple):
 
     free: FreeBodies
     movers: Movers
-    run: RunState
+    run: SteppingState
     finder: dict[str, Any]  # by attribute of `ContactFinder`
     workspaces: dict[str, Any]  # by attribute of `StepWorkspaces`
     joints: dict[str, Any]  # by field of `MechanismTables`
@@ -192,7 +192,7 @@ class ImpulseStepper:
         position: np.ndarray,
         velocity: np.ndarray,
         laws: Surfaces,
-        state: RunState,
+        state: SteppingState,
         margin: float,
         solver: str = "auto",
         joints: MechanismTables | None = None,
@@ -375,7 +375,7 @@ class ImpulseStepper:
         r = self.workspaces
         return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.state, self.solver, r)
 
-    def last(self) -> tuple[Contacts, ContactMemory]:
+    def last(self) -> tuple[ContactTable, ContactMemory]:
         """Return the contacts of the last step, and their history."""
         if self.state.counts.steps_taken % 2 == 1:
             return self.finder.now, self.workspaces.T.memory

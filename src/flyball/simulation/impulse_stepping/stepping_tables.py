@@ -78,7 +78,7 @@ class ContactMemory(Record, kind="Float", rows=True):
     # (its rows are also needed in the middle of the step), MIDDLE_FOUND (they were found, its bias is that of the mean)
 
 
-class ContactHistory(NamedTuple):
+class StoredContacts(NamedTuple):
     """Stored data of each contact; one for each of the two tables of contacts."""
 
     memory: ContactMemory
@@ -159,7 +159,7 @@ class RunAddresses(Record, kind="Int"):
     mechanism: int  # 0: there is none
 
 
-class RunState(NamedTuple):
+class SteppingState(NamedTuple):
     """Times, options and sums of a run."""
 
     gravity: Float1  # (3,) [m/s^2]
@@ -172,15 +172,15 @@ class RunState(NamedTuple):
     addresses: RunAddresses
 
 
-def initial_run_state(gravity: np.ndarray) -> RunState:
+def initial_run_state(gravity: np.ndarray) -> SteppingState:
     """Return the state of a run in which nothing is set but gravity."""
-    return RunState(
+    return SteppingState(
         np.array(gravity, float), RunTimes.blank(), RunTolerances.blank(), RunSums.blank(), RunExtremes.blank(),
         RunOptions.blank(), RunCounts.blank(), RunAddresses.blank(),
     )  # fmt: skip
 
 
-# tasks of `mechanism_step.mechanism_kernel`, in the order of a step (``wide`` is `ContactState.wide`):
+# tasks of `mechanism_step.mechanism_kernel`, in the order of a step (``wide`` is `ContactSolution.wide`):
 # START: evaluate the start of a motion. FREE_VELOCITIES: velocities without impulses, from those before the step in
 # ``wide``; movers' twists follow. BEGIN: write them to ``wide``. ROWS: rows of contacts. APPLY_IMPULSES: read the
 # solved velocities from ``wide`` and write consistent ones there. MEAN_VELOCITIES: write the mean velocities to

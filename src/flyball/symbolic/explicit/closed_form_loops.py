@@ -27,11 +27,19 @@ from typing import Any
 
 import numpy as np
 
-from ...expression_graph.evaluation import directional_derivatives, evaluate, nodes_in_order, substitute, symbols_of
-from ...expression_graph.graph import NUMBER, Graph, Node, Symbol
+from ...expression_graph.graph import (
+    NUMBER,
+    Graph,
+    Node,
+    Symbol,
+    directional_derivatives,
+    evaluate,
+    nodes_in_order,
+    substitute,
+    symbols_of,
+)
 from ...math.scalar import atan2, cos, rounded, sin, sqrt
-from .definitions import Definition
-from .zero_test import Probe
+from .definitions import Definition, Probe
 
 Affine = tuple[Any, list[tuple[Any, Any]]]
 """Constant, and the coefficients of cosine and sine of each angle."""
@@ -131,7 +139,7 @@ def harmonic_form(x: Node, angles: Sequence[Node], probe: Probe) -> Affine:
 DEAD_CENTRE = 1e-9  # discriminant below this part of its cancelling terms: the branches meet
 
 
-class Solution:
+class SolvedUnknown:
     """A formula for an unknown.
 
     Attributes
@@ -151,7 +159,7 @@ class Solution:
         self.value, self.how, self.never = value, how, never or []
 
 
-def solve_single(x: Node, w: Node, probe: Probe) -> Solution:
+def solve_single(x: Node, w: Node, probe: Probe) -> SolvedUnknown:
     """Solve one equation for its only unknown.
 
     Raises
@@ -167,7 +175,7 @@ def solve_single(x: Node, w: Node, probe: Probe) -> Solution:
     raise FormMismatch
 
 
-def linear_unknown(x: Node, w: Node, probe: Probe) -> Solution:
+def linear_unknown(x: Node, w: Node, probe: Probe) -> SolvedUnknown:
     """Solve a w + b = 0."""
     slope = directional_derivatives([x], [(w, 1.0)])[0]
     if probe.zero(slope, probe.size(x)) or depends_on(slope, w, probe):
@@ -175,18 +183,18 @@ def linear_unknown(x: Node, w: Node, probe: Probe) -> Solution:
     return solve_linear(x, probe.simplest(at_zero(slope, w) if contains_symbol(slope, w) else slope), w)
 
 
-def solve_linear(x: Node, slope: Any, w: Node) -> Solution:
+def solve_linear(x: Node, slope: Any, w: Node) -> SolvedUnknown:
     """Solve a linear equation with the known slope a."""
-    return Solution(-at_zero(x, w) / slope, "linear", [slope] if isinstance(slope, Node) else [])
+    return SolvedUnknown(-at_zero(x, w) / slope, "linear", [slope] if isinstance(slope, Node) else [])
 
 
-def harmonic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
+def harmonic_unknown(x: Node, w: Node, probe: Probe) -> SolvedUnknown:
     """Solve A cos w + B sin w + C = 0: w = atan2(B, A) + s atan2(sqrt(A^2 + B^2 - C^2), -C), s = 1 or -1."""
     k, ((a, b),) = harmonic_form(rationalised(x, w), [w], probe)
     return solve_harmonic((a, b, k), w, probe)
 
 
-def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution:
+def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> SolvedUnknown:
     """Solve it from its coefficients."""
     A, B, C = abc
     if A == 0.0 and B == 0.0:
@@ -197,7 +205,7 @@ def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution
         at = probe.at_start(found)
         opposite = math.cos(at - drawn) < 0.0
         value = atan2(A, -1.0 * B) if opposite else found
-        return Solution(value, "A cos w + B sin w = 0", [A * A + B * B])
+        return SolvedUnknown(value, "A cos w + B sin w = 0", [A * A + B * B])
     D = A * A + B * B - C * C
     if not probe.at_start(D) > DEAD_CENTRE * probe.at_start(C * C):
         raise FormMismatch
@@ -205,10 +213,10 @@ def solve_harmonic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution
     plus = probe.at_start(far) + probe.at_start(turn) - drawn
     minus = probe.at_start(far) - probe.at_start(turn) - drawn
     sign = 1.0 if math.cos(plus) > math.cos(minus) else -1.0
-    return Solution(far + sign * turn, f"A cos w + B sin w + C = 0, branch {'+' if sign > 0 else '-'}", [D])
+    return SolvedUnknown(far + sign * turn, f"A cos w + B sin w + C = 0, branch {'+' if sign > 0 else '-'}", [D])
 
 
-def quadratic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
+def quadratic_unknown(x: Node, w: Node, probe: Probe) -> SolvedUnknown:
     """Solve A w^2 + B w + C = 0 for a length w."""
     x = rationalised(x, w)
     slope = directional_derivatives([x], [(w, 1.0)])[0]
@@ -219,7 +227,7 @@ def quadratic_unknown(x: Node, w: Node, probe: Probe) -> Solution:
     return solve_quadratic((a, at_zero(slope, w), at_zero(x, w)), w, probe)
 
 
-def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solution:
+def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> SolvedUnknown:
     """Solve it from its coefficients."""
     a, b, c = (w.graph.node(y) for y in abc)
     if probe.zero(a):
@@ -232,7 +240,7 @@ def solve_quadratic(abc: tuple[Any, Any, Any], w: Node, probe: Probe) -> Solutio
     values = [(-0.5 * b + sign * sqrt(D)) / a for sign in (1.0, -1.0)]
     away = [abs(probe.at_start(y) - drawn) for y in values]
     best = away.index(min(away))
-    return Solution(values[best], f"quadratic, branch {'+-'[best]}", [D])
+    return SolvedUnknown(values[best], f"quadratic, branch {'+-'[best]}", [D])
 
 
 def rationalised(x: Node, w: Node) -> Node:
@@ -259,7 +267,7 @@ UnknownPair = tuple[Node, Node]
 Matrix = np.ndarray
 
 
-def eliminate_slide(x: UnknownPair, d: Sequence[Any], s: Node) -> tuple[Any, Solution]:
+def eliminate_slide(x: UnknownPair, d: Sequence[Any], s: Node) -> tuple[Any, SolvedUnknown]:
     """Eliminate s from two equations p + d s = 0 with a known d.
 
     Returns
@@ -269,12 +277,12 @@ def eliminate_slide(x: UnknownPair, d: Sequence[Any], s: Node) -> tuple[Any, Sol
     """
     p = [at_zero(e, s) for e in x]
     square = d[0] * d[0] + d[1] * d[1]
-    return d[1] * p[0] - d[0] * p[1], Solution(
+    return d[1] * p[0] - d[0] * p[1], SolvedUnknown(
         -(d[0] * p[0] + d[1] * p[1]) / square, "along a direction", [square] if isinstance(square, Node) else []
     )
 
 
-def rrr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
+def rrr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[SolvedUnknown]:
     """Solve two equations for two angles (RRR dyad).
 
     Returns
@@ -295,12 +303,12 @@ def rrr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solutio
     c, s = cos(w[0]), sin(w[0])
     r = [p[n] + P[n, 0] * c + P[n, 1] * s for n in range(2)]
     e = [-1.0 * (N[0, n] * r[0] + N[1, n] * r[1]) for n in range(2)]
-    second = Solution(atan2(e[1], e[0]), "direction of the other link")
+    second = SolvedUnknown(atan2(e[1], e[0]), "direction of the other link")
     second.radius = square  # |e| = |N| |r|, and |r| = |N|
     return [first, second]
 
 
-def rpr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
+def rpr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[SolvedUnknown]:
     """Solve two equations for an angle w[0] and a slide w[1] on the link that turns by it (RPR dyad).
 
     Returns
@@ -326,7 +334,7 @@ def rpr_dyad(x: UnknownPair, w: tuple[Node, Node], probe: Probe) -> list[Solutio
     first.how = f"slide on a turning link: {first.how}"
     T = s * N + L
     e = [-1.0 * (T[0, n] * k[0] + T[1, n] * k[1]) for n in range(2)]
-    second = Solution(atan2(e[1], e[0]), "direction of the slide")
+    second = SolvedUnknown(atan2(e[1], e[0]), "direction of the slide")
     second.radius = reach  # |e| = |T| |k|, and |T| = |k|
     return [first, second]
 
@@ -527,7 +535,7 @@ class LoopSolver:
                 return True
         return False
 
-    def _solved(self, equations: Sequence[Node], unknowns: Sequence[Node], solutions: Sequence[Solution]) -> None:
+    def _solved(self, equations: Sequence[Node], unknowns: Sequence[Node], solutions: Sequence[SolvedUnknown]) -> None:
         for w, solution in zip(unknowns, solutions, strict=True):
             self.found.append(Definition((w,), (solution.value,), (), solution.how, solution.radius))
             self.never += [(w.data.name, y) for y in solution.never]
@@ -535,7 +543,7 @@ class LoopSolver:
         self.unknowns = [w for w in self.unknowns if not any(w is y for y in unknowns)]
         self.known += unknowns
 
-    def _postpone(self, w: Node, solution: Solution) -> None:
+    def _postpone(self, w: Node, solution: SolvedUnknown) -> None:
         self.later.append(Definition((w,), (solution.value,), (), solution.how))
         self.never += [(w.data.name, y) for y in solution.never]
         self.unknowns.remove(w)

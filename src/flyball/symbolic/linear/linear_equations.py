@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import AnalysisError, ModelError
-from ...expression_graph.evaluation import evaluate, substitute, symbols_of
-from ...expression_graph.graph import Node, Symbol
+from ...expression_graph.graph import Node, Symbol, evaluate, substitute, symbols_of
 from ...linear.operating_point import operating_state
 from ...model.messages import listing, suggest
 from ...model.model import Model
@@ -21,21 +20,33 @@ from ...results.wording import with_unit
 from ...tables.coordinate_choice import rotors, spanning_joints
 from ..explicit.linear_systems import nominal_value
 from ..expressions import Expressions, SymbolTable
-from .derivatives import Derivatives, Perturbed, TracedMechanism, refuse_unknown, trace_mechanism
-from .equilibrium import (
+from .operating_point import (
+    OperatingPoint,
     Validity,
     balancing_multipliers,
     balancing_parameters,
     equilibrium_conditions,
+    given_point,
     not_identically_zero,
+    reference_point,
     refuse_singular,
     refuse_unbalanced,
     refuse_unsteady,
 )
-from .operating_point import OperatingPoint, given_point, reference_point
 from .polynomials import cancel_common_factors, readable_coefficients, scale_fraction
-from .reduction import Freedoms, StateSpaceMatrices, find_freedoms, reduce_linear, state_space_matrices
 from .stability import StabilityConditions, stability_conditions
+from .state_matrices import (
+    Derivatives,
+    Freedoms,
+    Perturbed,
+    StateSpaceMatrices,
+    TracedMechanism,
+    find_freedoms,
+    reduce_linear,
+    refuse_unknown,
+    state_space_matrices,
+    trace_mechanism,
+)
 from .transfer_functions import PolynomialPencil, TransferFunction, checked_values, polynomial_pencil
 
 FACTORED = 300  # operations up to which entries are factored for display

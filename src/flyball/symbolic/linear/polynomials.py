@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ModelError
-from ...expression_graph.evaluation import nodes_in_order
-from ...expression_graph.graph import Graph, Node
+from ...expression_graph.graph import Graph, Node, nodes_in_order
 from ...expression_graph.printers.sympy import MAX_DENOMINATOR, SympyPrinter, fraction
 from ..explicit.linear_systems import nominal_value
 

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...expression_graph.evaluation import evaluate
-from ...expression_graph.graph import Node
-from .equilibrium import Validity
+from ...expression_graph.graph import Node, evaluate
+from .operating_point import Validity
 from .polynomials import PolynomialRing, SignAnalysis, determinant, inequality_sides, readable_coefficients
 from .transfer_functions import checked_values
 

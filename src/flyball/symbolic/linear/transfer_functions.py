@@ -21,16 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.linear_reduction import product
+from ...derivatives.reduced_equations import product
 from ...errors import ModelError, import_optional
-from ...expression_graph.evaluation import evaluate
-from ...expression_graph.graph import Node, zero_objects
+from ...expression_graph.graph import Node, evaluate, zero_objects
 from ...model.messages import listing, suggest
 from ...results.wording import with_unit
-from .derivatives import Perturbed, TracedMechanism
-from .equilibrium import Validity
+from .operating_point import Validity
 from .polynomials import PolynomialRing, determinant
-from .reduction import Freedoms, replaced
+from .state_matrices import Freedoms, Perturbed, TracedMechanism, replaced
 
 
 @dataclass

@@ -7,23 +7,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...assembly.compiled_mechanism import CompiledMechanism
-from ...derivatives.equation_derivatives import column_groups, friction_load_rows
-from ...engine.entry_point import MOTION
-from ...engine.kinematics import quaternion_at
-from ...numerics.integrators.radau import REGULARISATION as SOFTENED
-from ...numerics.integrators.radau import UNSCALED
-from ...numerics.integrators.radau_stages import STAGES
-from ...numerics.sparse_factorisation import LUPattern, analyse_lu, constrained_order
-from ...tables.structure_definition import Structure
-from ...tables.table_definitions import ALONG, BETWEEN, SCHUR, SLIDING, System
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..derivatives.equation_derivatives import column_groups, friction_load_rows
+from ..engine.entry_point import MOTION
+from ..engine.kinematics import quaternion_at
+from ..numerics.integrators.radau import REGULARISATION as SOFTENED
+from ..numerics.integrators.radau import UNSCALED
+from ..numerics.integrators.radau_stages import STAGES
+from ..numerics.sparse_factorisation import LUPattern, analyse_lu, constrained_order
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import ALONG, BETWEEN, SCHUR, SLIDING, System
 
 Dependence = tuple[np.ndarray, np.ndarray]
 """Equations of a term, and the variables that it depends on: velocities (and the positions along them), followed by
 states of controllers. Equations have the same numbers; those of the states are followed by rates of the rows."""
 
 
-class Terms(NamedTuple):
+class TermDerivatives(NamedTuple):
     """A sparse matrix of derivatives, assembled as sums of finite differences (complex steps)."""
 
     i: np.ndarray  # equations and velocities of its entries
@@ -108,7 +108,7 @@ class DependencePattern:
             out += [(self.entries[n], depends) for n in lines]
         return out
 
-    def terms(self, some: Sequence[Dependence], first: np.ndarray) -> Terms:
+    def terms(self, some: Sequence[Dependence], first: np.ndarray) -> TermDerivatives:
         """Return the derivatives of the sums of some terms, whose entries begin at ``first``."""
         group = self._groups([depends for _, depends in some])
         none = np.zeros(0, np.int64)
@@ -119,7 +119,7 @@ class DependencePattern:
         n = max(self.nv + self.nx, 1)
         keys, entry = np.unique(i * n + j, return_inverse=True)
         pick = np.column_stack([entry, group[j], at])
-        return Terms(keys // n, keys % n, pick.astype(np.int64), group)
+        return TermDerivatives(keys // n, keys % n, pick.astype(np.int64), group)
 
     def _groups(self, together: Sequence[np.ndarray]) -> np.ndarray:
         """Return a number for each variable, equal for variables that no term depends on together, (nv + nx,)."""

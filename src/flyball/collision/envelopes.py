@@ -8,12 +8,10 @@ envelopes moves.
 
 from __future__ import annotations
 
-from ...compiler.formulas import formula
-from ...math.scalar import sqrt
-from ...math.vec import add, cross, load3, load9, mv, norm, scale, store3, sub
-from .workspace import (
-    IS_SPHERE,
-)
+from ..compiler.formulas import formula
+from ..math.scalar import sqrt
+from ..math.vec import add, cross, load3, load9, mv, norm, scale, store3, sub
+from .tables import IS_SPHERE
 
 
 @formula

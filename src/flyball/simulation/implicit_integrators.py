@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...assembly.compiled_mechanism import CompiledMechanism
-from ...compiler.kernels import BoundKernel, JoinedBuffer, PooledBuffer, StructBuffer, StructPool
-from ...derivatives.equation_derivatives import COMPLEX_STEP, complex_system, refuse_function_laws
-from ...engine import residual
-from ...engine.calls import ResidualBatch
-from ...engine.entry_point import initialise_work, zero_work
-from ...engine.fixed_step_methods import AlphaArguments, AlphaWorkspace, alpha_steps, variational_steps
-from ...engine.implicit_steps import SIZES, ImplicitArguments, ImplicitWorkspace, JacobianPlan, radau_steps
-from ...engine.kinematics import quaternion_at
-from ...errors import ModelError, SimulationError
-from ...numerics.integrators import implicit_workspace as ds
-from ...numerics.integrators import time_loop as ex
-from ...numerics.integrators.butcher_tableaux import tableau
-from ...numerics.integrators.implicit_workspace import (
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..compiler.kernels import BoundKernel, JoinedBuffer, PooledBuffer, StructBuffer, StructPool
+from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_system, refuse_function_laws
+from ..engine import residual
+from ..engine.calls import ResidualBatch
+from ..engine.entry_point import initialise_work, zero_work
+from ..engine.fixed_step_methods import AlphaArguments, AlphaWorkspace, alpha_steps, variational_steps
+from ..engine.implicit_steps import SIZES, ImplicitArguments, ImplicitWorkspace, JacobianPlan, radau_steps
+from ..engine.kinematics import quaternion_at
+from ..errors import ModelError, SimulationError
+from ..numerics.integrators import implicit_workspace as ds
+from ..numerics.integrators import time_loop as ex
+from ..numerics.integrators.butcher_tableaux import tableau
+from ..numerics.integrators.implicit_workspace import (
     AlphaStepWorkspace,
     ImplicitReals,
     RadauStepWorkspace,
     VariationalStepWorkspace,
 )
-from ...tables.law_inputs import steep_law_names
-from ...tables.table_definitions import FREE, SCHUR, SCRATCH, SPHERICAL, System
-from ..initial_state import InitialState
-from ..integration_options import Integration
-from ..method_choice import DEFAULT_RHO_INF, GENERALISED_ALPHA, VARIATIONAL
+from ..tables.law_inputs import steep_law_names
+from ..tables.table_definitions import FREE, SCHUR, SCRATCH, SPHERICAL, System
+from .initial_state import InitialState
+from .integration_options import Integration
 from .jacobian_pattern import inverse_inertias, jacobian_layout, substitute_inertias
+from .method_choice import DEFAULT_RHO_INF, GENERALISED_ALPHA, VARIATIONAL
 
 ROW_REGULARISATION, LOADED_ROW_REGULARISATION = (
     1e-10,
