@@ -170,7 +170,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .symbolic.export import Code as Code
     from .symbolic.expressions import Expressions as Expressions
     from .symbolic.linear.linear_equations import LinearEquations as LinearEquations
-    from .symbolic.linear.stability import StabilityConditions as StabilityConditions
+    from .symbolic.linear.stability_conditions import StabilityConditions as StabilityConditions
     from .symbolic.linear.transfer_functions import TransferFunction as TransferFunction
 
 __version__ = "0.4.0"
@@ -242,7 +242,7 @@ _HOME = {
     "ExplicitEquations": "symbolic.explicit.explicit_equations",
     "Expressions": "symbolic.expressions",
     "LinearEquations": "symbolic.linear.linear_equations",
-    "StabilityConditions": "symbolic.linear.stability",
+    "StabilityConditions": "symbolic.linear.stability_conditions",
     "StateEquations": "symbolic.explicit.explicit_equations",
     "TransferFunction": "symbolic.linear.transfer_functions",
 }

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import flyball as fb
 from flyball.symbolic.linear.linear_equations import linear_equations
 from flyball.symbolic.linear.polynomials import PolynomialRing
-from flyball.symbolic.linear.stability import is_hurwitz, stability_conditions
+from flyball.symbolic.linear.stability_conditions import is_hurwitz, stability_conditions
 from tests.analyses.classical import CAPSIZE, WEAVE, bicycle, column, stand
 from tests.symbolic.small import cart, quarter_car
 

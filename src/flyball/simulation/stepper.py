@@ -29,7 +29,7 @@ from ..tables.structure_definition import Structure, velocity_names
 from ..tables.table_definitions import assign, copied
 from .diagnosis import failure_reason
 from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, begin_by_impulses
-from .impulse_stepping.stepper import NoSolution, SavedState
+from .impulse_stepping.impulse_stepper import NoSolution, SavedState
 from .initial_state import InitialState, find_initial_state
 from .integration_intervals import SmoothIntervals, known_breaks, laws_checked_in_steps, laws_of_time
 from .integration_options import Integration, Stepping, default_integration

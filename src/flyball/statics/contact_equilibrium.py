@@ -23,6 +23,7 @@ from ..model.model import Model
 from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, FRICTIONLESS, STICKS, Equilibrium, Touch
 from ..results.wording import MARGINAL, NOT_JUDGED
 from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
+from ..simulation.impulse_stepping.impulse_stepper import ImpulseStepper, NoSolution
 from ..simulation.impulse_stepping.setup import (
     MechanismMotion,
     StepSize,
@@ -33,7 +34,6 @@ from ..simulation.impulse_stepping.setup import (
     smallest_radius,
     values_with_stops,
 )
-from ..simulation.impulse_stepping.stepper import ImpulseStepper, NoSolution
 from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION
 from ..simulation.integration_options import Stepping
 from ..tables.contact_tables import ContactTables, contact_tables

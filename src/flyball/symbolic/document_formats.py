@@ -116,7 +116,7 @@ class SectionPart:
         """All expressions in the block."""
         return []
 
-    def put(self, given: Iterator[Any]) -> None:
+    def replace_expressions(self, given: Iterator[Any]) -> None:
         """Replace all expressions by the next ones given."""
 
     def text_lines(self, width: int) -> list[str]:
@@ -140,7 +140,7 @@ class Formulas(SectionPart):
         """All expressions in the formulas."""
         return [x for f in self.formulas for x in (f.right, *(c for c, _ in f.before), *(c for c, _ in f.after))]
 
-    def put(self, given: Iterator[Any]) -> None:
+    def replace_expressions(self, given: Iterator[Any]) -> None:
         """Replace all expressions by the next ones given."""
         for f in self.formulas:
             f.right = next(given)
@@ -173,7 +173,7 @@ class Matrix(SectionPart):
         """All entries."""
         return self.entries.ravel().tolist()
 
-    def put(self, given: Iterator[Any]) -> None:
+    def replace_expressions(self, given: Iterator[Any]) -> None:
         """Replace all entries by the next ones given."""
         for k in np.ndindex(self.entries.shape):
             self.entries[k] = next(given)
@@ -277,12 +277,12 @@ class Document:
         """All expressions in the document."""
         return [x for section in self.sections for block in section.blocks for x in block.expressions()]
 
-    def put(self, expressions: list[Any]) -> None:
+    def replace_expressions(self, expressions: list[Any]) -> None:
         """Replace all expressions."""
         given = iter(expressions)
         for section in self.sections:
             for block in section.blocks:
-                block.put(given)
+                block.replace_expressions(given)
 
 
 ZERO = Tex("0", "0")

@@ -343,12 +343,12 @@ def document(eq: Equations) -> Document:
     ]
     made = Document(eq.model.name, size_description(eq), sections)
     found, meant = simplify_with_names(made.expressions(), quaternions(eq.named_equations), candidate_symbols(eq))
-    made.put(found)
+    made.replace_expressions(found)
     as_sums(made, quaternions(eq.named_equations))
     without_zeros(made)
     count = len(made.expressions())
     found, letters = extract_common_subexpressions([*made.expressions(), *(y for _, y in meant)])
-    made.put(found[:count])
+    made.replace_expressions(found[:count])
     meant = [(x, y) for (x, _), y in zip(meant, found[count:], strict=True)]
     later = []
     if meant:

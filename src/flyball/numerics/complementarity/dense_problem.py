@@ -52,6 +52,15 @@ SOLUTION_FOUND, NO_SOLUTION, HOLD_IMPOSSIBLE = range(3)  # HOLD_IMPOSSIBLE: rows
 ) = range(10)
 
 
+class PivotTableau(NamedTuple):
+    """Scratch of Lemke's pivoting."""
+
+    T: Float2  # (m, 2 m + 2): tableau
+    basis: Int1  # (m,)
+    at: Int1  # (n + 1,): first unknown of each row in the tableau
+    Q: Float3  # (2, n, n + 1): x and reach as linear functions of the unknowns
+
+
 class DenseProblem(NamedTuple):
     """Data, results and scratch of a dense problem."""
 
@@ -72,10 +81,7 @@ class DenseProblem(NamedTuple):
     K: Float2  # (n, n): equations of a set of states; its factor
     swap: Int1  # (n,): row exchanges of its pivoting
     row: Float2  # (10, n)
-    T: Float2  # (m, 2 m + 2): tableau of pivoting
-    basis: Int1  # (m,)
-    at: Int1  # (n + 1,): first unknown of each row in the tableau
-    Q: Float3  # (2, n, n + 1): x and reach as linear functions of the unknowns of pivoting
+    pivoting: PivotTableau
 
 
 def allocate_dense(n: int) -> DenseProblem:
@@ -84,7 +90,8 @@ def allocate_dense(n: int) -> DenseProblem:
     z, i = np.zeros, np.int64
     return DenseProblem(
         z((n, n)), z(n), z(n), z(n, i), z(n), z((n, n)), z(n), z(n, i), z(n), z(n), z(n), z(3, i),
-        z((n, n)), z((n, n)), z((n, n)), z(n, i), z((10, n)), z((m, 2 * m + 2)), z(m, i), z(n + 1, i), z((2, n, n + 1)),
+        z((n, n)), z((n, n)), z((n, n)), z(n, i), z((10, n)),
+        PivotTableau(z((m, 2 * m + 2)), z(m, i), z(n + 1, i), z((2, n, n + 1))),
     )  # fmt: skip
 
 

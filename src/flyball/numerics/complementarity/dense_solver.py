@@ -78,7 +78,7 @@ def number_unknowns(P):
     """Assign numbers to the unknowns, the first of each row in ``at``; returns their count."""
     n, m = P.b.shape[0], 0
     for i in range(n):
-        P.at[i] = m
+        P.pivoting.at[i] = m
         if P.rule[i] == UNILATERAL:
             m += 1
         elif is_friction(P.rule[i]):
@@ -92,29 +92,29 @@ def reduce_problem(P):
     n = P.b.shape[0]
     for i in range(n):
         for j in range(n + 1):
-            P.Q[0, i, j] = P.Q[1, i, j] = 0.0
+            P.pivoting.Q[0, i, j] = P.pivoting.Q[1, i, j] = 0.0
         rule = P.rule[i]
         if rule == BILATERAL:
             for j in range(n):
-                P.Q[0, i, j] = P.N[i, j]
-            P.Q[0, i, i] += SOFTENING
-            P.Q[0, i, n] = P.row[SCALED_BIAS, i]
+                P.pivoting.Q[0, i, j] = P.N[i, j]
+            P.pivoting.Q[0, i, i] += SOFTENING
+            P.pivoting.Q[0, i, n] = P.row[SCALED_BIAS, i]
         elif rule == SLIDING:
             for j in range(n):
-                P.Q[0, i, j] = P.bound_sign[i] * P.scaled_gain[i, j]
-            P.Q[0, i, i] += 1.0
-            P.Q[0, i, n] = P.bound_sign[i] * P.row[SCALED_CONST, i]
+                P.pivoting.Q[0, i, j] = P.bound_sign[i] * P.scaled_gain[i, j]
+            P.pivoting.Q[0, i, i] += 1.0
+            P.pivoting.Q[0, i, n] = P.bound_sign[i] * P.row[SCALED_CONST, i]
     if not eliminate_rows(P):
         return False
     for i in range(n):
         of = i - 1 if P.rule[i] == FRICTION_DISC_2 else i
         for j in range(n + 1):
-            P.Q[1, i, j] = P.scaled_gain[of, j] if j < n and not is_eliminated(P.rule[j]) else 0.0
-        P.Q[1, i, n] = P.row[SCALED_CONST, of]
+            P.pivoting.Q[1, i, j] = P.scaled_gain[of, j] if j < n and not is_eliminated(P.rule[j]) else 0.0
+        P.pivoting.Q[1, i, n] = P.row[SCALED_CONST, of]
         for k in range(n):
             if is_eliminated(P.rule[k]):
                 for j in range(n + 1):
-                    P.Q[1, i, j] += P.scaled_gain[of, k] * P.Q[0, k, j]
+                    P.pivoting.Q[1, i, j] += P.scaled_gain[of, k] * P.pivoting.Q[0, k, j]
     return True
 
 
@@ -141,29 +141,29 @@ def eliminate_rows(P):
             continue
         best, size = -1, 0.0
         for i in range(n):
-            if is_eliminated(P.rule[i]) and P.swap[i] < 0 and abs(P.Q[0, i, k]) > size:
-                best, size = i, abs(P.Q[0, i, k])
+            if is_eliminated(P.rule[i]) and P.swap[i] < 0 and abs(P.pivoting.Q[0, i, k]) > size:
+                best, size = i, abs(P.pivoting.Q[0, i, k])
         if best < 0:
             return False
         P.swap[best] = k
-        d = P.Q[0, best, k]
+        d = P.pivoting.Q[0, best, k]
         for j in range(n + 1):
-            P.Q[0, best, j] /= d
+            P.pivoting.Q[0, best, j] /= d
         for i in range(n):
-            f = P.Q[0, i, k]
+            f = P.pivoting.Q[0, i, k]
             if i != best and is_eliminated(P.rule[i]) and f != 0.0:
                 for j in range(n + 1):
-                    P.Q[0, i, j] -= f * P.Q[0, best, j]
+                    P.pivoting.Q[0, i, j] -= f * P.pivoting.Q[0, best, j]
     for i in range(n):  # rows sorted by their unknowns, with the sign changed; Q[1] is scratch here
         if P.swap[i] >= 0:
             k = P.swap[i]
             for j in range(n + 1):
-                P.Q[1, k, j] = 0.0 if j < n and is_eliminated(P.rule[j]) else -P.Q[0, i, j]
+                P.pivoting.Q[1, k, j] = 0.0 if j < n and is_eliminated(P.rule[j]) else -P.pivoting.Q[0, i, j]
     for k in range(n):
         for j in range(n + 1):
-            P.Q[0, k, j] = P.Q[1, k, j] if is_eliminated(P.rule[k]) else 0.0
+            P.pivoting.Q[0, k, j] = P.pivoting.Q[1, k, j] if is_eliminated(P.rule[k]) else 0.0
         if P.rule[k] == UNILATERAL or is_friction(P.rule[k]):
-            P.Q[0, k, k] = 1.0
+            P.pivoting.Q[0, k, k] = 1.0
     return True
 
 
@@ -171,14 +171,14 @@ def eliminate_rows(P):
 def fill_tableau(P, m):
     """Fill the tableau of w = M z + z0 + q, with columns w, z, z0, q."""
     n = P.b.shape[0]
-    T = P.T
+    T = P.pivoting.T
     for a in range(m):
-        P.basis[a] = a
+        P.pivoting.basis[a] = a
         for c in range(2 * m + 2):
             T[a, c] = 0.0
         T[a, a], T[a, 2 * m] = 1.0, -1.0
     for i in range(n):
-        rule, a = P.rule[i], P.at[i]
+        rule, a = P.rule[i], P.pivoting.at[i]
         if rule == UNILATERAL:
             add_impulse_terms(P, m, a, i, (1.0, 0.0))
         elif is_friction(rule):
@@ -199,26 +199,26 @@ def add_impulse_terms(P, m, a, i, what):
     """Add (u, reach) . what of row i to row a of the tableau."""
     n = P.b.shape[0]
     for j in range(n + 1):
-        value = what[1] * P.Q[1, i, j]
+        value = what[1] * P.pivoting.Q[1, i, j]
         if what[0] != 0.0:
             for k in range(n):
                 soft = SOFTENING if k == i else 0.0
-                value += what[0] * (P.N[i, k] + soft) * P.Q[0, k, j]
+                value += what[0] * (P.N[i, k] + soft) * P.pivoting.Q[0, k, j]
             if j == n:
                 value += what[0] * P.row[SCALED_BIAS, i]
         if j == n:
-            P.T[a, 2 * m + 1] += value
+            P.pivoting.T[a, 2 * m + 1] += value
         elif P.rule[j] == UNILATERAL:
-            P.T[a, m + P.at[j]] -= value
+            P.pivoting.T[a, m + P.pivoting.at[j]] -= value
         elif is_friction(P.rule[j]):
-            P.T[a, m + P.at[j]] -= value
-            P.T[a, m + P.at[j] + 1] += value
+            P.pivoting.T[a, m + P.pivoting.at[j]] -= value
+            P.pivoting.T[a, m + P.pivoting.at[j] + 1] += value
 
 
 @formula
 def pivot_to_solution(P, m):
     """Pivot until z0 leaves the basis. Returns whether it does."""
-    T = P.T
+    T = P.pivoting.T
     least, most = 0.0, 0.0
     for a in range(m):
         most = max(most, abs(T[a, 2 * m + 1]))
@@ -232,10 +232,10 @@ def pivot_to_solution(P, m):
     row = leaving_row(P, m, enter, True)
     for _ in range(MAX_PIVOTS * (m + 1)):
         P.info[PIVOT_COUNT] += 1
-        leave = P.basis[row]
+        leave = P.pivoting.basis[row]
         pivot_on(P, m, row, enter)
         clear_rounding(P, m, nothing)
-        P.basis[row] = enter
+        P.pivoting.basis[row] = enter
         if leave == 2 * m:
             return True
         enter = leave + m if leave < m else leave - m
@@ -248,7 +248,7 @@ def pivot_to_solution(P, m):
 @formula
 def leaving_row(P, m, enter, start):
     """Row with the lexicographically smallest (q, inverse of the basis) over the entering column; -1: a ray."""
-    T = P.T
+    T = P.pivoting.T
     largest = 1.0
     for a in range(m):
         largest = max(largest, abs(T[a, enter]))
@@ -260,7 +260,7 @@ def leaving_row(P, m, enter, start):
             best = a
     if best >= 0 and not start:  # z0 leaves if possible
         for a in range(m):
-            if P.basis[a] == 2 * m and T[a, enter] > PIVOT_TOLERANCE * largest:
+            if P.pivoting.basis[a] == 2 * m and T[a, enter] > PIVOT_TOLERANCE * largest:
                 q, p = T[a, 2 * m + 1] / T[a, enter], T[best, 2 * m + 1] / T[best, enter]
                 if q <= p + TIE_TOLERANCE * (abs(p) + abs(q)):
                     return a
@@ -270,7 +270,7 @@ def leaving_row(P, m, enter, start):
 @formula
 def stands_before(P, m, two, enter, start):
     """Whether the first of two rows is lexicographically smaller."""
-    T = P.T
+    T = P.pivoting.T
     a, b = two
     da = 1.0 if start else T[a, enter]
     db = 1.0 if start else T[b, enter]
@@ -285,7 +285,7 @@ def stands_before(P, m, two, enter, start):
 @formula
 def pivot_on(P, m, row, enter):
     """Make the entering column a unit vector."""
-    T = P.T
+    T = P.pivoting.T
     d = T[row, enter]
     for c in range(2 * m + 2):
         T[row, c] /= d
@@ -300,16 +300,16 @@ def pivot_on(P, m, row, enter):
 def clear_rounding(P, m, nothing):
     """Set constants within rounding to zero."""
     for a in range(m):
-        if abs(P.T[a, 2 * m + 1]) <= nothing:
-            P.T[a, 2 * m + 1] = 0.0
+        if abs(P.pivoting.T[a, 2 * m + 1]) <= nothing:
+            P.pivoting.T[a, 2 * m + 1] = 0.0
 
 
 @formula
 def unknown_value(P, m, z):
     """Value of an unknown."""
     for a in range(m):
-        if P.basis[a] == m + z:
-            return P.T[a, 2 * m + 1]
+        if P.pivoting.basis[a] == m + z:
+            return P.pivoting.T[a, 2 * m + 1]
     return 0.0
 
 
@@ -317,7 +317,7 @@ def unknown_value(P, m, z):
 def read_states(P, m):
     """Read the states from the unknowns."""
     for i in range(P.b.shape[0]):
-        rule, a = P.rule[i], P.at[i]
+        rule, a = P.rule[i], P.pivoting.at[i]
         if rule == UNILATERAL:
             P.state[i] = AT_REST if unknown_value(P, m, a) > 0.0 else NO_IMPULSE
         elif is_friction(rule):
@@ -333,7 +333,7 @@ def read_states(P, m):
             P.state[i] = AT_REST if rule == BILATERAL else NO_IMPULSE
     for i in range(P.b.shape[0]):
         if P.rule[i] == FRICTION_DISC and not (P.state[i] == AT_REST and P.state[i + 1] == AT_REST):
-            a, b = P.at[i], P.at[i + 1]
+            a, b = P.pivoting.at[i], P.pivoting.at[i + 1]
             p, q = (
                 unknown_value(P, m, a) - unknown_value(P, m, a + 1),
                 unknown_value(P, m, b) - unknown_value(P, m, b + 1),
@@ -383,10 +383,10 @@ def solve_scaled(P):
             return NO_SOLUTION
         exchange_states(P, SOFTENED_IMPULSE, 10 + n)  # removes rounding errors of pivoting
     for i in range(n):
-        P.at[i] = P.state[i]
+        P.pivoting.at[i] = P.state[i]
     if not exchange_states(P, REFINED_IMPULSE, 10 + n):
         for i in range(n):
-            P.state[i] = P.at[i]
+            P.state[i] = P.pivoting.at[i]
         if not solve_states(P):
             return NO_SOLUTION
     idle = 0

@@ -33,6 +33,7 @@ from ...tables.contact_tables import ContactTables, contact_tables
 from ...tables.reference_configuration import BodyState
 from ..integration_intervals import PAUSED_MESSAGE, Segment, whole_motion
 from ..integration_options import Stepping
+from .impulse_stepper import ImpulseStepper, NoSolution
 from .setup import (
     MechanismMotion,
     StepSize,
@@ -49,7 +50,6 @@ from .setup import (
     with_earlier_energy,
 )
 from .step_loop import solver_counts
-from .stepper import ImpulseStepper, NoSolution
 from .stepping_tables import (
     RunSums,
 )

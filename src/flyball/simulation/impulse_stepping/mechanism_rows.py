@@ -417,7 +417,7 @@ def friction_law(A, P, i, k, x):
 
 @formula
 def rope_law(A, P, i, k, x):
-    """Set the law of a rope, -s = h (K (x - x0) + C r), at position and rate as in `implicit_springs`; it never
+    """Set the law of a rope, -s = h (K (x - x0) + C r), at position and rate as for springs; it never
     pushes.
     """
     h = A.real.step

@@ -42,8 +42,8 @@ from ...tables.values import Values
 from ..initial_state import InitialState, find_initial_state, initial_state_at
 from ..integration_intervals import Segment
 from ..integration_options import RESTITUTION_LAWS, Stepping
+from .impulse_stepper import ImpulseStepper, free_bodies
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
-from .stepper import ImpulseStepper, free_bodies
 from .stepping_tables import (
     LINE_FRICTION,
     LINE_ROPE,

@@ -34,7 +34,7 @@ from .operating_point import (
     refuse_unsteady,
 )
 from .polynomials import cancel_common_factors, readable_coefficients, scale_fraction
-from .stability import StabilityConditions, stability_conditions
+from .stability_conditions import StabilityConditions, stability_conditions
 from .state_matrices import (
     Derivatives,
     Freedoms,
