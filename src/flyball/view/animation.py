@@ -242,7 +242,8 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
     numbers = places.result.values.numbers[e.name]
     if len(ends) > 1:
         points = [places.track(end)[0] for end in ends]
-        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=_free_length(numbers, points)[every])
+        rest = _free_length(numbers, points)[every] if e.single == "rope" else None  # others are never slack
+        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=rest)
     pair = places.ends(e)
     if pair is None or e.symbol not in ("spring", "damper"):
         return None
