@@ -67,13 +67,11 @@ class Tendons:
         over = range(M.tendon_adr[k], M.tendon_adr[k] + M.tendon_num[k])
         kinds = [int(M.wrap_type[i]) for i in over]
         if kinds[0] == JOINT:
-            weights: dict[str, float] = {}
-            for i in over:
-                name = self.reader.coordinates[int(M.wrap_objid[i])]
-                weights[name] = weights.get(name, 0.0) + float(M.wrap_prm[i])
+            names = [self.reader.coordinates[int(M.wrap_objid[i])] for i in over]
+            weights = dict(zip(names, M.wrap_prm[over].tolist(), strict=True))
             self.read[k] = LinearSum({name: w for name, w in weights.items() if w})
-            if not self.read[k].weights:  # type: ignore[union-attr]
-                self._leave_out(k, "the sum of its coefficients is 0")
+            if not any(weights.values()):
+                self._leave_out(k, "its coefficients are 0")
         elif reason := next((NO_PATH[kind] for kind in kinds if kind in NO_PATH), ""):
             self._leave_out(k, reason)
         elif len({self.reader.bodies[M.site_bodyid[M.wrap_objid[i]]] for i in over}) == 1:
