@@ -127,7 +127,7 @@ def test_limits_friction_and_equalities(tmp_path):
 )  # fmt: skip
 def test_what_is_not_read_is_listed_with_the_reason(tmp_path, inside, match):
     bodies = BODIES.replace('<geom size=".05"/>', '<geom name="g" size=".05"/>')
+    path = tmp_path / "robot.xml"
+    path.write_text(f"<mujoco>{bodies}{inside}</mujoco>")
     with pytest.warns(fb.ModelWarning, match=match):
-        path = tmp_path / "robot.xml"
-        path.write_text(f"<mujoco>{bodies}{inside}</mujoco>")
         fb.load(path)

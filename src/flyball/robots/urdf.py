@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
-from ..forces.coordinate_spring import CoordinateSpring
+from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
 from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
@@ -48,7 +48,7 @@ COORDINATES = {"revolute": "angle", "continuous": "angle", "prismatic": "displac
 """Coordinate of each type of joint that has one."""
 JOINT_TYPES = (*COORDINATES, "fixed", "floating", "planar")
 UNDERSTOOD = {
-    "robot": {"name", "link", "joint", "material", "version"},
+    "robot": {"name", "link", "joint", "transmission", "material", "version"},
     "link": {"name", "inertial", "visual", "collision"},
     "inertial": {"origin", "mass", "inertia"},
     "mass": {"value"},
@@ -72,6 +72,9 @@ UNDERSTOOD = {
     "mimic": {"joint", "multiplier", "offset"},
 }
 """Tags, with the attributes and tags in them that are used."""
+IN_TRANSMISSIONS = {"transmission", "type", "joint", "actuator", "mechanicalReduction", "offset"}
+"""Tags of a transmission that are used; the offset moves the actuator's zero only, and no force depends on it."""
+SIMPLE = "SimpleTransmission"
 
 
 class _Element(ET.Element):
@@ -148,6 +151,7 @@ class _Reader:
             builder.start(tag, attributes).line = parser.CurrentLineNumber  # type: ignore[attr-defined]
 
         parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+        parser.CharacterDataHandler = builder.data
         try:
             parser.Parse(data, True)
         except expat.ExpatError as error:
@@ -286,6 +290,10 @@ class _Reader:
                 moving += self._limits_and_losses(j)
             waiting += below[j.child][::-1]
         m.add(*moving, *self._mimics())
+        parameters: dict[str, float] = {}
+        motors = list(self._motors(parameters))
+        m.parameters.update(parameters)
+        m.add(*motors)
         self._report()
         return m
 
@@ -335,7 +343,7 @@ class _Reader:
             tensor = self._physical(link, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
             given = {"mass": mass, "com": tuple(own[:3, 3]), "inertia": tensor, "inertia_axes": rows(own[:3, :3])}
         try:
-            m.add(Body(name, **given, **pose, shape=shapes or None, color=self._color(tag)))
+            m.add(Body(name, **given, **pose, shape=shapes or None, color=self._color(tag, shapes)))
         except ModelError as error:
             self.fail(inertial if inertial is not None else tag, str(error))
         self.carrier[link] = name
@@ -423,6 +431,63 @@ class _Reader:
             ends = [f"{self.names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
             yield Coupler(self.name(f"{self.names[j.name]}_mimic"), tuple(ends), weights=(1.0, -factor), value=offset)
 
+    def _motors(self, parameters: dict[str, float]) -> Iterator[Element]:
+        """Actuators of simple transmissions: reduction times control, with the control as a parameter."""
+        kinds = {j.name: j.kind for j in self.joints}
+        driven: dict[str, str] = {}
+        for tag in self.robot.findall("transmission"):
+            kind = (tag.get("type") or tag.findtext("type") or "").strip().rpartition("/")[2]
+            if kind != SIMPLE:
+                why = f"transmission of type {kind or 'unknown'}, which is not {SIMPLE}"
+                self.unused.setdefault(why, []).append(line_of(tag))
+                continue
+            name = self.attribute(tag, "name")
+            joint, actuator = self._only(tag, "joint"), self._only(tag, "actuator")
+            moved = self.attribute(joint, "name")
+            if moved not in kinds:
+                self.fail(joint, f"transmission {name!r} drives the joint {moved!r}, which does not exist")
+            if moved in driven:
+                self.fail(
+                    joint, f"transmissions {driven[moved]!r} and {name!r} drive one joint, {moved!r}; leave one out"
+                )
+            driven[moved] = name
+            reduction = self._reduction(tag)
+            if kinds[moved] not in COORDINATES:
+                why = f"transmission of a {kinds[moved]} joint"
+                self.unused.setdefault(why, []).append(line_of(tag))
+                continue
+            called = self.name(self.attribute(actuator, "name"))
+            control = self.name(f"control_{called}")
+            parameters[control] = 0.0
+            along = f"{self.names[moved]}.{COORDINATES[kinds[moved]]}"
+            yield Actuator(called, along, force=f"{reduction!r}*{control}")
+
+    def _only(self, transmission: ET.Element, role: str) -> ET.Element:
+        """The one joint or actuator of a simple transmission."""
+        found = transmission.findall(role)
+        if len(found) != 1:
+            name = transmission.get("name")
+            self.fail(transmission, f"transmission {name!r} has {len(found)} <{role}>; a {SIMPLE} has one")
+        return found[0]
+
+    def _reduction(self, transmission: ET.Element) -> float:
+        """Speed of the actuator relative to that of the joint; 1 if not given."""
+        found = [x for x in transmission.iter("mechanicalReduction")]
+        if not found:
+            return 1.0
+        text = (found[0].text or "").strip()
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if len(found) > 1 or not math.isfinite(value) or value == 0.0:
+            self.fail(
+                found[-1],
+                f"<mechanicalReduction> of transmission {transmission.get('name')!r} is {text!r}; one finite number is "
+                f"needed, not 0",
+            )
+        return value
+
     def _shapes(self, link: ET.Element) -> list[Solid]:
         """Visible shapes of a link, those for collision where there are no others that can be read."""
         found = list(self._solids(link.findall("visual")))
@@ -448,31 +513,36 @@ class _Reader:
             return Sphere(radius=self.number(x, "radius"), **given)
         if x.tag == "cylinder":
             return Cylinder(radius=self.number(x, "radius"), length=self.number(x, "length"), **given)
-        if x.tag != "mesh" or (file := self._mesh_file(x)) is None:
+        if x.tag != "mesh":
             return None
+        file = self._mesh_file(x)
         scale = self.numbers(x, "scale", "1 1 1")
-        if np.ptp(scale) != 0.0 or scale[0] <= 0.0:
-            self.missing.append(f"{file.name} (scaled by {scale})")
-            return None
-        return Mesh(path=str(file), scale=float(scale[0]), **given)
+        if np.ptp(scale) == 0.0 and scale[0] > 0.0:
+            return Mesh(path=str(file), scale=float(scale[0]), **given)
+        if not scale.all():
+            raise ModelError(f"it is scaled by {' '.join(f'{k:g}' for k in scale)}, which leaves no solid")
+        surface = Mesh(path=str(file)).triangulation
+        faces = surface.f if scale.prod() > 0.0 else surface.f[:, ::-1]  # a mirror image turns triangles inside out
+        return Mesh(vertices=surface.v * scale, faces=faces, **given)
 
-    def _mesh_file(self, tag: ET.Element) -> Path | None:
+    def _mesh_file(self, tag: ET.Element) -> Path:
         """The file of a mesh: ``package://name/path`` is looked for in the folders above the model."""
         text = self.attribute(tag, "filename")
         inside = re.sub(r"^(package|model|file)://", "", text)
         folders = [self.path.parent, *self.path.absolute().parents]
         tries = [folder / part for folder in folders for part in (inside, inside.partition("/")[2])]
         found = next((x for x in tries if x.is_file()), None)
-        if found is None or found.suffix.lower() not in MESH_FORMATS:
-            self.missing.append(f"{text} in line {line_of(tag)}")
-            return None
+        if found is None:
+            raise ModelError(f"there is no file {text}")
+        if found.suffix.lower() not in MESH_FORMATS:
+            raise ModelError(f"{text} is not of a kind that can be read: {', '.join(MESH_FORMATS)}")
         return found
 
-    def _color(self, link: ET.Element) -> str | None:
-        """Colour of the first visible shape, also by the name of a material of the robot."""
+    def _color(self, link: ET.Element, shapes: Sequence[Solid]) -> str | None:
+        """Colour of the first visible shape, also by the name of a material of the robot; else that of its mesh."""
         material = link.find("visual/material")
         if material is None:
-            return None
+            return next((x.triangulation.color or None for x in shapes[:1] if isinstance(x, Mesh) and x.path), None)
         color = material.find("color")
         if color is None:
             same = [x for x in self.robot.findall("material") if x.get("name") == material.get("name")]
@@ -487,10 +557,7 @@ class _Reader:
         self._note_unused(self.robot)
         parts = [f"<{what}> (line {shortened(lines)})" for what, lines in self.unused.items()]
         if self.missing:
-            formats = ", ".join(MESH_FORMATS)
-            parts.append(
-                f"shapes that cannot be drawn, or files that are not found or not {formats} ({shortened(self.missing)})"
-            )
+            parts.append(f"shapes that cannot be drawn ({shortened(self.missing)})")
         if parts:
             warn_user(f"{self.path.name}: not used: {'; '.join(parts)}", ModelWarning)
         if self.renamed:
@@ -508,7 +575,11 @@ class _Reader:
             if name not in known and not name.startswith("xmlns"):
                 self.unused.setdefault(f"{tag.tag} {name}", []).append(line_of(tag))
         for x in tag:
-            if x.tag not in known:
+            if x.tag == "transmission":
+                for y in x.iter():
+                    if y.tag not in IN_TRANSMISSIONS:
+                        self.unused.setdefault(str(y.tag), []).append(line_of(y))
+            elif x.tag not in known:
                 self.unused.setdefault(str(x.tag), []).append(line_of(x))
             else:
                 self._note_unused(x)
