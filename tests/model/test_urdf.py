@@ -367,3 +367,34 @@ def test_equal_limits_fix_a_joint(tmp_path):
     assert not len(p.v)
     along = (np.cos(0.5), 0, -np.sin(0.5))
     np.testing.assert_allclose(p.pose("tool", [])[0], [0, 0.1, 0.4] + 0.9 * np.array(along), atol=1e-14)
+
+
+def test_motors_and_shapes_are_written_and_what_is_not_has_a_reason(tmp_path):
+    """Motors are simple transmissions; holes are not drawn; rods are cylinders, tubes have no counterpart."""
+    m = fb.Mechanism("arm", gravity=(0, 0, -9.80665), parameters={"u": 0.2})
+    rod = fb.Rod(start=(0, 0, 0), end=(0.4, 0, 0), radius=0.02, looks=True)
+    hole, tube = fb.Box(edges=(0.01, 0.01, 0.01), hole=True), fb.Tube(radius=0.1, inner_radius=0.05, length=0.2)
+    m.add(fb.Body("a", mass=2, inertia=(0.1, 0.1, 0.1), shape=(rod, tube, hole)))
+    m.add(fb.Body("b", mass=2, inertia=(0.1, 0.1, 0.1), position=(1, 0, 0)))
+    m.add(
+        fb.Revolute("J", "ground", "a", at=(0, 0, 0), axis=(0, 1, 0)),
+        fb.Revolute("K", "a", "b", at=(1, 0, 0), axis=(0, 1, 0)),
+    )
+    m.add(
+        fb.Motor("drive", "J", torque="-30*u"), fb.Motor("other", "J", torque=2), fb.Ground("floor", shape=fb.Plane())
+    )
+    m.add(fb.Limit("soft", "K.angle", lower=0, stiffness=3), fb.Sensor("angle", "K.angle"))
+    reasons = (
+        r"Ground 'floor' \(ground has no shapes in URDF\), Sensor 'angle' \(the file describes the motion only\), Motor 'other' "
+        r"\(URDF has damping and friction of joints and simple transmissions\), Limit 'soft' \(URDF has rigid stops of "
+        r"joints\), Tube of a \(URDF has boxes, cylinders, spheres and mesh files\)"
+    )
+    with pytest.warns(fb.ModelWarning, match=reasons):
+        m.save(tmp_path / "arm.urdf")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        n = fb.load(tmp_path / "arm.urdf")
+    assert n["drive"].coordinate == "J.angle" and n["drive"].force == "-30.0*control_drive"
+    (shape,) = n["a"].shapes()
+    assert (shape.radius, shape.length) == (0.02, 0.4)
+    np.testing.assert_allclose(shape.position, (0.2, 0, 0), atol=1e-15)

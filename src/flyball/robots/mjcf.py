@@ -82,8 +82,11 @@ class Reader:
 
     def name(self, kind: str, k: int, default: str) -> str:
         """A name that flyball permits and that is not taken."""
-        given = self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k)
-        return self.free_name(given or default)
+        return self.free_name(self.given_name(kind, k) or default)
+
+    def given_name(self, kind: str, k: int) -> str:
+        """The name in the file; empty if there is none."""
+        return self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k) or ""
 
     def free_name(self, wanted: str) -> str:
         """The name, with other characters where Python permits none, and not one that is taken."""
@@ -242,12 +245,11 @@ class Reader:
                 self.unused.append(f"actuator {name} ({reason})")
                 continue
             control, target = self.free_name(f"control_{name}"), int(M.actuator_trnid[k, 0])
-            law = self._actuator_law(k, control)
             found: Element | None = None
             if M.actuator_trntype[k] in ON_JOINT and target in self.coordinates:
-                found = Actuator(name, self.coordinates[target], force=law)
+                found = Actuator(name, self.coordinates[target], force=self._actuator_law(k, control))
             elif M.actuator_trntype[k] == ON_TENDON:
-                found = self.tendons.actuator(name, target, law)
+                found = self.tendons.actuator(name, target, lambda *of, k=k, c=control: self._actuator_law(k, c, *of))
             if found is None:
                 self.unused.append(
                     f"actuator {name} (it acts on neither a hinge, nor a slide, nor a tendon that is read)"
@@ -273,13 +275,13 @@ class Reader:
             return "it has damping or armature of its own"
         return ""
 
-    def _actuator_law(self, k: int, control: str) -> str:
+    def _actuator_law(self, k: int, control: str, value: str = "value", sign: float = 1.0) -> str:
         """Force of an actuator: gear (gain control + bias), the bias linear in gear times value and rate."""
         M = self.M
         gear, gain, bias = float(M.actuator_gear[k, 0]), float(M.actuator_gainprm[k, 0]), M.actuator_biasprm[k]
-        force = f"{gear!r}*({gain!r}*{control}"
+        force = f"{sign * gear!r}*({gain!r}*{control}"
         if M.actuator_biastype[k]:
-            force += f" + {float(bias[0])!r} + {float(bias[1])!r}*{gear!r}*value + {float(bias[2])!r}*{gear!r}*rate"
+            force += f" + {float(bias[0])!r} + {float(bias[1])!r}*{gear!r}*{value} + {float(bias[2])!r}*{gear!r}*rate"
         return force + ")"
 
     def _shapes(self, b: int) -> Iterator[Solid]:

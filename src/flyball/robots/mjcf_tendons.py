@@ -5,7 +5,7 @@ Springs, dampers, stops, friction, actuators and equalities of tendons become el
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +57,7 @@ class Tendons:
     def __init__(self, reader: Reader) -> None:
         self.reader = reader
         M = reader.M
-        self.names = {k: reader.name("TENDON", k, f"tendon{k}") for k in range(M.ntendon)}
+        self.names = {k: reader.given_name("TENDON", k) or f"tendon{k}" for k in range(M.ntendon)}
         self.read: dict[int, LinearSum | Path] = {}
         for k in self.names:
             self._read(k)
@@ -135,13 +135,16 @@ class Tendons:
         if M.tendon_frictionloss[k]:
             self.reader.unused.append(f"friction of tendon {name} (a path has no friction along its length)")
 
-    def actuator(self, name: str, k: int, law: str) -> Element | None:
-        """An actuator of a tendon, by its force as a law of ``value`` and ``rate``; None if the tendon was not read."""
+    def actuator(self, name: str, k: int, law: Callable[..., str]) -> Element | None:
+        """An actuator of a tendon; None if the tendon was not read.
+
+        ``law`` returns its force, by default as a law of ``value``; other arguments are that name, and a factor.
+        """
         tendon = self.read.get(k)
         if isinstance(tendon, LinearSum):
-            return Actuator(name, **tendon.fields, force=law)
+            return Actuator(name, **tendon.fields, force=law())
         if isinstance(tendon, Path):  # MuJoCo's force lengthens a tendon, a tension shortens it
-            return PathSpring(name, tendon.frames, force=f"-({law.replace('value', 'length')})")
+            return PathSpring(name, tendon.frames, force=law("length", -1.0))
         return None
 
     def equality(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | None:
