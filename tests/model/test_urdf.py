@@ -374,8 +374,8 @@ def test_motors_and_shapes_are_written_and_what_is_not_has_a_reason(tmp_path):
     m = fb.Mechanism("arm", gravity=(0, 0, -9.80665), parameters={"u": 0.2})
     rod = fb.Rod(start=(0, 0, 0), end=(0.4, 0, 0), radius=0.02, looks=True)
     hole, tube = fb.Box(edges=(0.01, 0.01, 0.01), hole=True), fb.Tube(radius=0.1, inner_radius=0.05, length=0.2)
-    m.add(fb.Body("a", mass=2, inertia=(0.1, 0.1, 0.1), shape=(rod, tube, hole)))
-    m.add(fb.Body("b", mass=2, inertia=(0.1, 0.1, 0.1), position=(1, 0, 0)))
+    m.add(fb.Body("a", mass=2, inertia=(0.1, 0.1, 0.1), shape=(rod, tube)))
+    m.add(fb.Body("b", density=100, shape=(fb.Box(edges=(0.1, 0.2, 0.3)), hole), position=(1, 0, 0)))
     m.add(
         fb.Revolute("J", "ground", "a", at=(0, 0, 0), axis=(0, 1, 0)),
         fb.Revolute("K", "a", "b", at=(1, 0, 0), axis=(0, 1, 0)),
@@ -398,3 +398,5 @@ def test_motors_and_shapes_are_written_and_what_is_not_has_a_reason(tmp_path):
     (shape,) = n["a"].shapes()
     assert (shape.radius, shape.length) == (0.02, 0.4)
     np.testing.assert_allclose(shape.position, (0.2, 0, 0), atol=1e-15)
+    assert len(n["b"].shapes()) == 1
+    assert n["b"].mass == pytest.approx(100 * (0.006 - 1e-6))
