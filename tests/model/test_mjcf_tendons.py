@@ -122,6 +122,10 @@ def test_limits_friction_and_equalities(tmp_path):
         ('<equality><joint name="e" joint1="A" joint2="B" polycoef="0 1 2 0 0"/></equality>', r"equality e \(its polynomial is not linear\)"),
         ('<actuator><muscle name="x" joint="A" lengthrange="0 1"/></actuator>', r"actuator x \(it has activation states\)"),
         ('<actuator><motor name="x" joint="Q"/></actuator>', r"actuator x \(it acts on neither a hinge, nor a slide, nor a tendon that is read\)"),
+        ('<keyframe><key qvel="1 0 0 0 0 0"/></keyframe>', r"1 keyframes \(states are set by Initial\)"),
+        ('<worldbody><body gravcomp="1"><joint stiffness="1 2"/><geom size="1"/></body></worldbody><option density="1"/>', "gravity compensation of bodies; forces of a fluid.*; nonlinear stiffness or damping of joints"),
+        ('<equality><weld name="e" body1="a" body2="ball" relpose="1 0 0 1 0 0 0"/></equality>', r"relpose of equality e \(bodies are welded as they are in qpos0\)"),
+        ('<worldbody><geom name="h" type="hfield" hfield="h"/></worldbody><asset><hfield name="h" nrow="3" ncol="3" size="1 1 1 1"/></asset>', r"geom h of ground \(hfield\)"),
         ('<actuator><motor name="x" joint="A" ctrllimited="true" ctrlrange="-1 1"/></actuator>', r"ranges of control and force of actuators \(x: parameters have no range\)"),
     ],
 )  # fmt: skip
@@ -131,3 +135,33 @@ def test_what_is_not_read_is_listed_with_the_reason(tmp_path, inside, match):
     path.write_text(f"<mujoco>{bodies}{inside}</mujoco>")
     with pytest.warns(fb.ModelWarning, match=match):
         fb.load(path)
+
+
+def test_sites_are_connected_and_welded(tmp_path):
+    """Equalities of sites bring them together, where the bodies may be apart in the reference configuration."""
+    sites = """<worldbody><body name="d" pos="0 0 0.2"><freejoint/><geom size=".1"/><site name="eye" pos="0 .1 0" euler="0 0 1"/></body></worldbody>
+      <equality><{} name="e" site1="hook" site2="eye"/></equality>"""
+    for kind in ("connect", "weld"):
+        m, _, _ = read(tmp_path, BODIES + sites.format(kind))
+        run = m.simulate(0.05, outputs=3)
+        np.testing.assert_allclose(run["eye"].position, run["hook"].position, atol=1e-9)
+        if kind == "weld":
+            np.testing.assert_allclose(run["eye"].rotation, run["hook"].rotation, atol=1e-9)
+
+
+def test_a_joint_starts_within_its_range(tmp_path):
+    """Where that of qpos0 is not permitted, in the middle."""
+    m, _, _ = read(
+        tmp_path, BODIES.replace('name="S" type="slide"', 'name="S" type="slide" limited="true" range="0.1 0.3"')
+    )
+    assert m.simulate(0.01, outputs=2)["S.displacement"][0] == pytest.approx(0.2)
+
+
+def test_errors_name_the_file(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text("<mujoco>" + BODIES.replace('type="slide"', 'type="slide" damping="-1"') + "</mujoco>")
+    with pytest.raises(fb.ModelError, match=r"robot.xml: CoordinateSpring 'S_spring': damping is -1; it must be"):
+        fb.load(path)
+    (tmp_path / "folder.xml").mkdir()
+    with pytest.raises(fb.ModelError, match="cannot be read: it is a folder"):
+        fb.load(tmp_path / "folder.xml")

@@ -86,7 +86,7 @@ def test_and_back(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", fb.ModelWarning)
         again = fb.load(tmp_path / "forest.xml")
-    again.parameters["control_motor"] = 2.0
+    assert again.parameters == {"control_motor": 2.0}
     p, r = m.prepare(coordinates="joint"), again.prepare(coordinates="joint")
     a, b = p.acceleration(0.0, p.q, p.v), r.acceleration(0.0, r.q, r.v)
     for name in ("b2", "b3", "b4", "b8", "tool"):

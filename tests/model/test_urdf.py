@@ -248,6 +248,15 @@ def test_meshes_are_found_beside_the_package(tmp_path):
         (('lower="0.1" upper="0.3"', 'lower="0.4" upper="0.3"'), "limits of joint 'rail' are reversed: 0.4 to 0.3"),
         (('type="fixed"', 'type="continuous"'), "link 'tool' moves, and neither it nor a link beyond it has mass"),
         (('name="tool"', 'name="slide"'), "there are two links 'slide'"),
+        (('name="tool"', 'name=" "'), "line 17: a link has an empty name"),
+        (('<mass value="2"/>', '<mass value="1_0"/>'), "line 8: value='1_0' of <mass>: a finite number is needed"),
+        (('<mass value="2"/>', '<mass value="2"/><mass value="3"/>'), "line 8: <inertial> of 'upper-arm' has a second <mass>; leave one out"),
+        (('<axis xyz="1 0 0"/>', '<axis xyz="1 0 0"/><axis xyz="0 1 0"/>'), "line 23: <joint> of 'rail' has a second <axis>"),
+        (('<axis xyz="1 0 0"/>', '<mimic joint="rail"/>'), "joint 'rail' follows itself"),
+        (('<axis xyz="1 0 0"/>', '<mimic joint="shoulder" multiplier="0"/>'), "line 23: the multiplier of joint 'rail' is 0"),
+        (("<robot", '<!DOCTYPE r [<!ENTITY a "' + 1000 * "a" + '"><!ENTITY b "' + 1000 * "&a;" + '"><!ENTITY c "' + 1000 * "&b;" + '">]><robot title="&c;"'), "arm.urdf is no XML: limit on input amplification"),
+        (('version="1.0"', 'version="1.0" encoding="nonsense"'), "arm.urdf is no XML: unknown encoding: nonsense"),
+        (('<link name="tool"/>', '<xacro:arm/>'), "line 17: <xacro:arm> is a macro; expand the file first"),
         (("</robot>", MOTOR.replace('"shoulder"', '"elbow"')), "line 32: transmission 'gear' drives the joint 'elbow', which does not exist"),
         (("</robot>", MOTOR.replace("-50", "0")), "line 33: <mechanicalReduction> of transmission 'gear' is '0'; one finite number is needed, not 0"),
         (("</robot>", MOTOR.replace("-50", "fifty")), "transmission 'gear' is 'fifty'; one finite number"),
@@ -400,3 +409,25 @@ def test_motors_and_shapes_are_written_and_what_is_not_has_a_reason(tmp_path):
     np.testing.assert_allclose(shape.position, (0.2, 0, 0), atol=1e-15)
     assert len(n["b"].shapes()) == 1
     assert n["b"].mass == pytest.approx(100 * (0.006 - 1e-6))
+
+
+def test_odd_but_sound_files(tmp_path):
+    """UTF-16, axes that are not of unit length, names of meshes that no file can have, a long chain without masses."""
+    path = tmp_path / "arm.urdf"
+    text = ARM.replace('<axis xyz="0 2 0"/>', '<axis xyz="0 1e200 0"/>')
+    mesh = f'<mesh filename="{5000 * "x"}.stl"/>'
+    for encoding, box in (("utf-8", "<geometry/>"), ("utf-16", f"<geometry>{mesh}</geometry>")):
+        path.write_bytes(text.replace('<geometry><box size="0.2 0.2 0.1"/></geometry>', box).encode(encoding))
+        with pytest.warns(
+            fb.ModelWarning, match=r"cannot be drawn \(<(geometry> in line 4: it is empty|mesh> in line 4: there is no)"
+        ):
+            m = fb.load(path)
+        np.testing.assert_allclose(m["shoulder"].axis, (0, 1, 0), atol=1e-15)
+    links = "".join(f'<link name="l{k}"/>' for k in range(1100))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
+        for k in range(1099)
+    )
+    path.write_text(f'<robot name="r">{links}{joints}</robot>')
+    with pytest.raises(fb.ModelError, match="link 'l1' moves, and neither it nor a link beyond it has mass"):
+        fb.load(path)

@@ -21,7 +21,7 @@ from ..joints.fixed import Fixed
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
 from ..joints.spherical import Spherical
-from ..model.body import GROUND, Body, Frame, Ground
+from ..model.body import GROUND, Body, Frame, Ground, Initial
 from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
@@ -34,11 +34,13 @@ from ..model.shapes.plane import Plane
 from ..model.shapes.solid import Solid
 from ..model.shapes.sphere import Sphere
 from .mjcf_tendons import Tendons, linear_relation
-from .urdf import rows
+from .robot_file import rows
 
 T = TypeVar("T", bound=Model)
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's kinds of joints (mjtJoint)."""
+ROUNDING = 1e-9
+"""Of poses in a file, relative to the size of the model."""
 COORDINATES = {SLIDE: "displacement", HINGE: "angle"}
 ON_JOINT, ON_TENDON = (0, 1), 3
 """MuJoCo's kinds of transmissions (mjtTrn): along a joint, also in the parent's axes; along a tendon."""
@@ -57,12 +59,12 @@ def load_mjcf(path: Path, make: Callable[..., T]) -> T:
     except ImportError:
         raise ModelError(f"{path}: MJCF is read by MuJoCo; install it: pip install 'flyball[mjcf]'") from None
     if not path.is_file():
-        raise ModelError(f"{path} cannot be read: there is no such file")
+        raise ModelError(f"{path} cannot be read: {'it is a folder' if path.is_dir() else 'there is no such file'}")
     try:
         return Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), path).mechanism(make)
     except ValueError as error:
         if isinstance(error, ModelError):
-            raise
+            raise type(error)(f"{path}: {error}") from None
         raise ModelError(f"{path}: {' '.join(str(error).split())}") from None
 
 
@@ -180,7 +182,7 @@ class Reader:
         return Revolute(name, first, second, at=at, axis=axis, angle=drawn)
 
     def _losses(self, j: int) -> Iterator[Element]:
-        """Stops, spring, damping and friction of a joint."""
+        """Stops, spring, damping and friction of a joint, and an initial value if that of `qpos0` is not permitted."""
         M, d = self.M, self.M.jnt_dofadr[j]
         if M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]].any():
             self.unused.append(f"armature of {self.joints.get(j, 'the free joint')}")
@@ -194,6 +196,8 @@ class Reader:
         if M.jnt_limited[j]:
             lower, upper = M.jnt_range[j].tolist()
             yield Limit(self.free_name(f"{name}_limit"), along, lower=lower, upper=upper)
+            if not lower <= M.qpos0[M.jnt_qposadr[j]] <= upper:
+                yield Initial(along, value=0.5 * (lower + upper))
         stiffness, damping, friction = (float(x) for x in (M.jnt_stiffness[j], M.dof_damping[d], M.dof_frictionloss[d]))
         if stiffness or damping:
             rest = float(M.qpos_spring[M.jnt_qposadr[j]])
@@ -208,17 +212,13 @@ class Reader:
         kind = kinds(int(M.eq_type[k]))
         name = self.name("EQUALITY", k, f"equality{k}")
         a, b, data = M.eq_obj1id[k], M.eq_obj2id[k], M.eq_data[k]
-        bodies = M.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_BODY
         relation: Element | None = None
         if not M.eq_active0[k]:
             self.unused.append(f"equality {name} (it is not active)")
-        elif kind == kinds.mjEQ_CONNECT and bodies:
-            at = self.D.xpos[a] + self.D.xmat[a].reshape(3, 3) @ data[:3]
-            yield Spherical(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
-        elif kind == kinds.mjEQ_WELD and bodies:
-            yield Fixed(name, self.bodies[a], self.bodies[b], at=tuple(self.D.xpos[a].tolist()))
+        elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+            yield from self._closed_loop(name, k, kind == kinds.mjEQ_WELD)
         elif kind not in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
-            self.unused.append(f"equality {name} (connect and weld are read between bodies, others of joints, tendons)")
+            self.unused.append(f"equality {name} (of flexible bodies)")
         elif data[2:5].any():
             self.unused.append(f"equality {name} (its polynomial is not linear)")
         elif kind == kinds.mjEQ_TENDON:
@@ -230,6 +230,26 @@ class Reader:
         if relation is not None:
             yield relation
 
+    def _closed_loop(self, name: str, k: int, weld: bool) -> Iterator[Element]:
+        """The joint of a connect or weld, of bodies as they are in `qpos0`, or of sites, which it brings together."""
+        M, D = self.M, self.D
+        a, b, data = int(M.eq_obj1id[k]), int(M.eq_obj2id[k]), M.eq_data[k]
+        joint = Fixed if weld else Spherical
+        if M.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_SITE:
+            yield joint(name, self.sites[a], self.sites[b])
+            return
+        if self.bodies[a] == self.bodies[b]:
+            self.unused.append(f"equality {name} (both its bodies are fixed to the world)")
+            return
+        at, R = D.xpos[a] + D.xmat[a].reshape(3, 3) @ data[:3], D.xmat[b].reshape(3, 3)
+        if weld:
+            at = D.xpos[a]
+            wanted = D.xmat[a].reshape(3, 3) @ quaternion_to_matrix(data[6:10])
+            gap = D.xpos[a] + D.xmat[a].reshape(3, 3) @ data[3:6] - D.xpos[b] - R @ data[:3]
+            if max(np.abs(gap).max() / M.stat.extent, np.abs(wanted - R).max()) > ROUNDING:
+                self.unused.append(f"relpose of equality {name} (bodies are welded as they are in qpos0)")
+        yield joint(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
+
     def _joint_relation(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | None:
         """Relation y - y0 = offset + slope (x - x0) of two joints, or of one (``second`` is -1)."""
         y0, x0 = (float(self.M.qpos0[self.M.jnt_qposadr[j]]) if j >= 0 else 0.0 for j in (first, second))
@@ -238,7 +258,7 @@ class Reader:
 
     def _actuators(self, parameters: dict[str, float]) -> Iterator[Element]:
         """Actuators of joints and tendons, with the control as a parameter ``control_NAME``."""
-        M, clamped = self.M, list[str]()
+        M, clamped, controls = self.M, list[str](), self._controls()
         for k in range(getattr(M, "nactuator", M.nu)):
             name = self.name("ACTUATOR", k, f"actuator{k}")
             if reason := self._no_law(k):
@@ -255,7 +275,7 @@ class Reader:
                     f"actuator {name} (it acts on neither a hinge, nor a slide, nor a tendon that is read)"
                 )
                 continue
-            parameters[control] = 0.0
+            parameters[control] = float(controls[getattr(M, "actuator_ctrladr", range(M.nu))[k]])
             if M.actuator_ctrllimited[k] or M.actuator_forcelimited[k]:
                 clamped.append(name)
             yield found
@@ -263,6 +283,15 @@ class Reader:
             self.unused.append(
                 f"ranges of control and force of actuators ({', '.join(clamped)}: parameters have no range)"
             )
+
+    def _controls(self) -> np.ndarray:
+        """Controls at the start: those of the only keyframe, if it is at rest in `qpos0`; else 0."""
+        M = self.M
+        if M.nkey == 1 and not M.key_qvel.any() and np.allclose(M.key_qpos[0], M.qpos0, rtol=0.0, atol=ROUNDING):
+            return M.key_ctrl[0]
+        if M.nkey:
+            self.unused.append(f"{M.nkey} keyframes (states are set by Initial)")
+        return np.zeros(M.nu)
 
     def _no_law(self, k: int) -> str:
         """Why an actuator's force is no linear law of its control, length and velocity; empty if it is one."""
@@ -310,14 +339,30 @@ class Reader:
                 faces = M.mesh_face[at : at + M.mesh_facenum[k]]
                 yield Mesh(vertices=vertices.tolist(), faces=faces.tolist(), looks=True, **given)
             else:
-                self.unused.append(f"a geom of {self.mujoco.mj_id2name(M, self.mujoco.mjtObj.mjOBJ_BODY, b)}")
+                what = kinds(int(kind)).name.removeprefix("mjGEOM_").lower()
+                self.unused.append(f"geom {self.given_name('GEOM', g) or g} of {self.bodies.get(b, GROUND)} ({what})")
 
     def _report(self) -> None:
         M = self.M
-        counts = {"sensors": M.nsensor, "contact pairs": M.npair, "flexible bodies": getattr(M, "nflex", 0)}
+        counts = {
+            "sensors": M.nsensor,
+            "contact pairs": M.npair,
+            "flexible bodies": getattr(M, "nflex", 0),
+            "plugins": M.nplugin,
+            "mocap bodies, which stay where they are": M.nmocap,
+        }
         for what, count in counts.items():
             if count:
                 self.unused.append(f"{count} {what}")
+        effects = {
+            "gravity compensation of bodies": M.body_gravcomp,
+            "forces of a fluid (density, viscosity, wind)": (M.opt.density, M.opt.viscosity),
+            "nonlinear stiffness or damping of joints": np.append(
+                *(np.ravel(getattr(M, what, 0.0)) for what in ("jnt_stiffnesspoly", "dof_dampingpoly"))
+            ),
+            "ranges of actuator forces of joints": M.jnt_actfrclimited,
+        }
+        self.unused += [what for what, values in effects.items() if np.any(values)]
         if (M.geom_contype | M.geom_conaffinity).any():
             self.unused.append("contact of geoms (add shapes without looks=True, and fb.Contact)")
         if self.unused:
