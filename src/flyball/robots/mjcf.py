@@ -260,11 +260,12 @@ class Reader:
         """Actuators of joints and tendons, with the control as a parameter ``control_NAME``."""
         M, clamped, controls = self.M, list[str](), self._controls()
         for k in range(getattr(M, "nactuator", M.nu)):
-            name = self.name("ACTUATOR", k, f"actuator{k}")
+            given = self.given_name("ACTUATOR", k) or f"actuator{k}"
+            name = self.free_name(given)
             if reason := self._no_law(k):
                 self.unused.append(f"actuator {name} ({reason})")
                 continue
-            control, target = self.free_name(f"control_{name}"), int(M.actuator_trnid[k, 0])
+            control, target = self.free_name(f"control_{given}"), int(M.actuator_trnid[k, 0])
             found: Element | None = None
             if M.actuator_trntype[k] in ON_JOINT and target in self.coordinates:
                 found = Actuator(name, self.coordinates[target], force=self._actuator_law(k, control))

@@ -384,8 +384,8 @@ class _Reader(RobotFile):
                 why = f"transmission of a {kinds[moved]} joint"
                 self.unused.setdefault(why, []).append(line_of(tag))
                 continue
-            called = self.name(self.attribute(actuator, "name"))
-            control = self.name(f"control_{called}")
+            given = self.attribute(actuator, "name")
+            called, control = self.name(given), self.name(re.sub(r"\W", "_", f"control_{given}"))
             parameters[control] = 0.0
             along = f"{self.names[moved]}.{COORDINATES[kinds[moved]]}"
             yield Actuator(called, along, force=f"{reduction!r}*{control}")
