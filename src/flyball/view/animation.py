@@ -65,6 +65,8 @@ def attachment_text(e: Any) -> str:
     about = getattr(e, "joint", None) or getattr(e, "coordinate", None)
     if isinstance(about, str):
         return f"on {about}"
+    if isinstance(about, tuple):
+        return f"on {', '.join(about)}"
     measured = getattr(e, "of", None) or getattr(e, "frame", None)
     return f"of {measured}" if isinstance(measured, str) else ""
 
