@@ -146,3 +146,13 @@ def test_a_path_that_is_shorter_than_its_spring_pushes():
     run = m.simulate(0.1, outputs=3)
     np.testing.assert_allclose(run["s"].tension, 50 * (run["s"].length - 4), rtol=1e-12)
     assert (run["s"].tension < 0).all()
+
+
+def test_an_input_along_a_sum_has_the_unit_of_its_effort():
+    """Transfer from a torque along the sum to the wheel: weight / (J s^2) without springs."""
+    m = wheel_and_slide(fb.Actuator("e", **SUM, force=0), spin=0, slip=0)
+    found = m.linearize(["e"], ["A.angle", "e.value"])
+    assert tuple(found.input_units) == ("N*m",)
+    s = 0.7j
+    gain = found.C @ np.linalg.solve(s * np.eye(len(found.A)) - found.A, found.B)
+    np.testing.assert_allclose(gain[:, 0], np.array([2 / 0.5, 4 / 0.5 + 9 / 2]) / s**2, rtol=1e-12)
