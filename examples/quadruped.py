@@ -2,9 +2,10 @@
 
 It drops with folded legs, lands, stretches its legs, and shifts its weight. The twelve joints follow a posture by PD
 control; the efforts that carry the legs are computed from their masses. The trunk is free: what it weighs bends the
-springs of the gains. Impulse time stepping solves the contact of feet and trunk with the floor.
+springs of the gains. Impulse time stepping solves the contact of feet and trunk with the floor; its step follows from
+the size of the bodies, and the feet are smaller, so that it is limited.
 
-Run it with ``flyball run examples/quadruped.py --t-end 4 --outputs 201 --out out``.
+Run it with ``flyball run examples/quadruped.py --t-end 4 --outputs 201 --max-step 4ms --out out``.
 """
 
 import warnings

@@ -49,6 +49,7 @@ USES = {
     "Detent": 'fb.Detent("notches", "A.angle", pitch="30 deg", holding="2 N*m")',
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
+    "PathSpring": 'fb.PathSpring("tendon", ("forearm", "pulley", "finger"), stiffness="2e3 N/m", force="5*command")',
     "PointForce": 'fb.PointForce("push", "cart", force=(10, 0), at=(0, 0.1))',
     "PointTorque": 'fb.PointTorque("drive", "wheel", torque=5)',
     "Rope": 'fb.Rope("rope", ("ground", "load"), at=((0, 2), (0, 0)), stiffness="2e5 N/m", damping="200 N*s/m")',

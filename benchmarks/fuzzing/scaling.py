@@ -186,8 +186,10 @@ def _scaled(m: fb.Mechanism, e: Any, s: Scale, laws: Laws) -> Any:
 
 def _along(m: fb.Mechanism, e: Any, own: dict, s: Scale, laws: Laws) -> None:
     """Springs, actuators, stops and notches along a coordinate."""
-    c = e.coordinate
-    x, f = s.coordinate(c), s.effort(c)
+    first, *_ = along = (e.coordinate,) if isinstance(e.coordinate, str) else e.coordinate
+    x, f = s.coordinate(first), s.effort(first)
+    if "weights" in own:
+        own["weights"] = tuple(times(w, x / s.coordinate(c)) for w, c in zip(own["weights"], along, strict=True))
     per = {"stiffness": f / x, "damping": f / x * s.time, "holding": f}
     for k in ("rest", "lower", "upper", "pitch", "notch", "tooth"):
         per[k] = x
@@ -317,7 +319,8 @@ SPECIAL = {
     **dict.fromkeys(("PID", "StateSpace", "Lag", "Integrator", "Transfer", "State"), _controller),
     **dict.fromkeys(("Motor", "TorsionalSpringDamper"), _torsion),
     **dict.fromkeys(("PointForce", "PointTorque"), _point),
-    "Clutch": _clutch, "SpringDamper": _spring, "JointFriction": _joint_friction, "Driver": _driver,
+    **dict.fromkeys(("SpringDamper", "PathSpring"), _spring),
+    "Clutch": _clutch, "JointFriction": _joint_friction, "Driver": _driver,
     "Initial": _initial, "Coupler": _coupler, "Backlash": _backlash, "Contact": _contact, "MaterialPair": _contact,
     "Event": _event, "Bodies": _bodies, "Table": _as_it_is, "GearPair": _as_it_is,
 }  # fmt: skip

@@ -18,8 +18,8 @@ Describe a mechanism
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
     couplings     GearPair, RackAndPinion, Coupler
-    forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
-                  RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
+    forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
+                  Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws

@@ -76,6 +76,17 @@ def everything():
         )
     )
     m.add(
+        fb.PathSpring(
+            "tendon",
+            bodies=("a", "c", "e"),
+            at=((0.1, 0.5, 0), (1, 0.3, -0.4), (2, 0.4, -0.8)),
+            stiffness=20.0,
+            damping=0.3,
+            force="2 + 0.1*rate",
+        )
+    )
+    m.add(fb.CoordinateSpring("pair", ("A.angle", "D.displacement"), weights=(1, "0.3 rad/m"), stiffness=2.0))
+    m.add(
         fb.SpringDamper(
             "spring",
             "b",

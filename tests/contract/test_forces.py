@@ -36,13 +36,16 @@ PARAMETERS = {
     "Clutch": (1.0, 1.2),
     "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0, 1.0, 1.0),
     "Motor": (),
+    "PathSpring": (30.0, 2.0, 0.4),
     "Rope": (30.0, 2.0, 0.4),
     "RotorInertia": (),
     "TorsionalSpringDamper": (30.0, 2.0, 0.4),
 }
 UNDAMPED = {  # of those that store energy and damp as well
     "Bushing": (*PARAMETERS["Bushing"][:3], 0.0, 0.0, 0.0, *PARAMETERS["Bushing"][6:9], 0.0, 0.0, 0.0),
-    **dict.fromkeys(("SpringDamper", "CoordinateSpring", "Rope", "TorsionalSpringDamper"), (30.0, 0.0, 0.4)),
+    **dict.fromkeys(
+        ("SpringDamper", "CoordinateSpring", "PathSpring", "Rope", "TorsionalSpringDamper"), (30.0, 0.0, 0.4)
+    ),
     "Limit": (30.0, 0.0, 70.0, 0.0, -0.1, 0.4),
     "Backlash": (30.0, 0.0, 30.0, 0.0, -0.1, 0.1),
     "Detent": (3.0, 20.0, 0.1, 0.0),

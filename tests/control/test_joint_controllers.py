@@ -151,6 +151,32 @@ def test_impulse_time_stepping_has_controllers_without_states():
     assert run["shoulder.angle"][-1] == pytest.approx(smooth["shoulder.angle"][-1], abs=2e-3)
 
 
+def ball(*more):
+    """A link with a hinge on a link with a ball joint."""
+    m = fb.Mechanism("ball", gravity=(0, 0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=(0.1, 0.2, 0.3), position=(0.3, 0, 0)))
+    m.add(fb.Body("b", mass=1, inertia=(0.1, 0.2, 0.3), position=(0.6, 0, 0)))
+    m.add(fb.Spherical("S", "ground", "a", at=(0, 0, 0)), fb.Revolute("R", "a", "b", at=(0.45, 0, 0), axis=(0, 1, 0)))
+    c = fb.GravityCompensatedPD("c", coordinates=["R.angle", *more], reference=0, kp=10, kd=1)
+    m.add(c)
+    return driven(m, c)
+
+
+def test_the_remedy_for_a_ball_joint():
+    """Three hinges with massless bodies between them; the weight is held at the reference."""
+    m = ball().changed({"c": None, "R drive": None, "S": None})
+    for k, axis in enumerate(((0, 0, 1), (0, 1, 0), (1, 0, 0))):
+        if k < 2:
+            m.add(fb.Body(f"link{k}", mass=0, inertia=0))
+        ends = ("ground", "link0", "link1", "a")[k : k + 2]
+        m.add(fb.Revolute(f"S{k}", *ends, at=(0, 0, 0), axis=axis))
+    angles = ["S0.angle", "S1.angle", "S2.angle", "R.angle"]
+    c = fb.GravityCompensatedPD("c", coordinates=angles, reference=[0.2, -0.3, 0.1, 0.4], kp=60, kd=14)
+    m.add(c)
+    run = driven(m, c).simulate(8, outputs=3)
+    assert [run[k][-1] for k in angles] == pytest.approx([0.2, -0.3, 0.1, 0.4], abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -166,6 +192,12 @@ def test_impulse_time_stepping_has_controllers_without_states():
         (
             lambda: arm(compensated(coordinates="shoulder.angle", reference=0)).simulate(0.1),
             r"coordinates that it does not control: elbow.angle; add them.*ignored",
+        ),
+        (lambda: ball("S.roll", "S.pitch", "S.yaw").simulate(0.1), "ball joints, Spherical 'S'.*three Revolute joints"),
+        (lambda: arm(computed(parameters={"load": "2 m"}), load="1 kg"), "parameter 'load' of.*'2 m': expected a mass"),
+        (
+            lambda: arm(computed(parameters={"load": "a"}), load="1 kg", a="2 m"),
+            "parameter 'a' is '2 m': expected a mass",
         ),
         (lambda: arm(computed()).inverse_dynamics([0, 1]), "ComputedTorque 'c'"),
         (lambda: arm(computed()).prepare(), "ComputedTorque 'c'"),

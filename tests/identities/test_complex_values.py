@@ -107,6 +107,8 @@ def with_forces(where):
     m.add(fb.Brake("hold", "H.angle", capacity="2.0 + rate**2", static=1.2))
     m.add(fb.Clutch("grip", "J.displacement", "a.x", capacity="3 N"))
     m.add(fb.Rope("rope", ("a", "b", "ground"), at=(p, q, r), stiffness=80.0, damping=1.0))
+    m.add(fb.PathSpring("tendon", ("a", "b", "ground"), at=(p, q, r), stiffness=80.0, damping=1.0, force="length*rate"))
+    m.add(fb.CoordinateSpring("pair", ("H.angle", "a.x"), weights=(1, 3), stiffness=3.0, damping=0.4, rest=0.1))
     m.add(fb.Detent("notches", "H.angle", pitch="40 deg", holding="0.4 N*m", notch=0.1, damping=0.02))
     m.add(fb.Detent("dimples", "J.displacement", pitch="4 cm", barrier="2 J"))
     m.add(fb.Limit("soft", "H.angle", lower=-0.1, upper=0.1, stiffness=30.0, damping=0.3))

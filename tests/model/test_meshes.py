@@ -178,6 +178,6 @@ def test_without_trimesh(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trimesh.creation.box((1, 1, 1.5)).export("part.stl")
     monkeypatch.setitem(sys.modules, "trimesh", None)
     weight(fb.Mesh(**TETRAHEDRON))
-    said = r"Body 'b': Mesh 'part\.stl': reading mesh files takes the package trimesh: pip install trimesh"
+    said = r"Body 'b': Mesh 'part\.stl': reading .stl files takes the package trimesh: pip install 'flyball\[meshes\]'"
     with pytest.raises(fb.ModelError, match=said):
         weight(fb.Mesh(path="part.stl"))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.model.body import frame_of
+from flyball.model.element import resolve
+from flyball.model.inertia import checked_shapes
 from tests.analyses.test_closed_loops import four_bar, spatial_four_bar
 
 mujoco = pytest.importorskip("mujoco")
@@ -84,7 +88,7 @@ def test_and_back(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", fb.ModelWarning)
         again = fb.load(tmp_path / "forest.xml")
-    again.parameters["control_motor"] = 2.0
+    assert again.parameters == {"control_motor": 2.0}
     p, r = m.prepare(coordinates="joint"), again.prepare(coordinates="joint")
     a, b = p.acceleration(0.0, p.q, p.v), r.acceleration(0.0, r.q, r.v)
     for name in ("b2", "b3", "b4", "b8", "tool"):
@@ -123,10 +127,6 @@ def test_closed_loops(tmp_path, make):
 def test_what_mjcf_does_not_have(tmp_path):
     path = tmp_path / "m.xml"
     m = forest()
-    m.add(fb.SpringDamper("rope", "b0", "b5", stiffness=3), fb.CoordinateSpring("more", "r.angle", damping=1))
-    with pytest.warns(fb.ModelWarning, match=r"no counterpart of SpringDamper 'rope', CoordinateSpring 'more'; the"):
-        m.save(path)
-    m = forest()
     m.add(fb.Body("b9", mass=1, inertia=INERTIA), fb.Screw("screw", "b0", "b9", at=(0, 0, 0), axis=(0, 0, 1), lead=0.1))
     with pytest.raises(fb.ModelError, match="Screw 'screw' has no counterpart in MJCF"):
         m.save(path)
@@ -142,3 +142,162 @@ def test_what_mjcf_does_not_have(tmp_path):
     m.add(fb.Revolute("J", "ground", "rod", at=(0, 0, 0), axis=(0, 1, 0)))
     with pytest.raises(fb.ModelError, match="'rod' moves and has no inertia about some axis"):
         m.save(path)
+
+
+UNWRITTEN = {
+    "MJCF has no Bushing": fb.Bushing("x", "b0", "b5", at=(0, 0, 0), stiffness=3),
+    "its law is not a multiple of a parameter": fb.Actuator("x", "r.angle", force="2*u + 1"),
+    "its law is not a multiple of a parameter ": fb.Motor("x", "r", torque=3),
+    "its law is not a multiple of a parameter  ": fb.CoordinateSpring("x", "r.angle", stiffness=1, force="u"),
+    "its damping acts only where its spring does": fb.Limit("x", "r.angle", lower=1, stiffness=3, damping=1),
+    "b0.x is not the coordinate of a hinge or slide": fb.CoordinateSpring("x", "b0.x", stiffness=1),
+    "friction is a number in MJCF, the same at rest": fb.Brake("x", "r.angle", capacity="u"),
+    "the format prescribes no motion": fb.Driver("x", "r.angle", "sin(t)"),
+    "the file starts at the reference configuration": fb.Initial("r.angle", value=0.1),
+    "the file has no laws": fb.Lag("x", of="u", time=1),
+    "the file has no events": fb.Event("x", "t > 1", do=[fb.Stop()]),
+    "the file describes the motion only": fb.Sensor("x", "r.angle"),
+    "contact is not written": fb.Material("x", friction=0.3),
+    "stops are soft in MuJoCo": fb.Limit("x", "arm.angle", lower=-1, restitution=0.3),
+}
+
+
+@pytest.mark.parametrize("reason", UNWRITTEN)
+def test_what_is_left_out_is_listed_with_the_reason(tmp_path, reason):
+    m = forest()
+    m.add(UNWRITTEN[reason])
+    with pytest.warns(fb.ModelWarning, match=rf"MJCF has no counterpart of .*\({reason.strip()}\); the file lacks"):
+        m.save(tmp_path / "m.xml")
+
+
+def tendons() -> fb.Mechanism:
+    """Springs, dampers, stops, friction and motors along sums of coordinates and along paths."""
+    m = forest()
+    m.parameters.update(tension=0.7, pull=-0.4, torque=1.5)
+    pair = {"coordinate": ["r.angle", "arm.angle", "p.displacement"], "weights": [1, "-0.5", 3]}
+    m.add(
+        fb.CoordinateSpring("pair", **pair, stiffness=4, damping=0.3, rest=0.2),
+        fb.Actuator("pull it", **pair, force="pull"),
+    )
+    m.add(
+        fb.Limit("soft", **pair, lower=-0.3, upper=0.1, stiffness=7),
+        fb.Limit("one", "arm.angle", upper=0.2, stiffness=5),
+    )
+    m.add(fb.CoordinateSpring("more", "r.angle", stiffness=1.3, damping=1), fb.Motor("turn", "r", torque="-2*torque"))
+    m.add(fb.SpringDamper("line", "b0", "tool", at=((1, 2, 3), (0, 1, 0)), stiffness=3, damping=0.2))
+    m.add(fb.PathSpring("path", ["ground", "b6", "tool"], stiffness=5, damping=0.1, length=1.7))
+    m.add(fb.PathSpring("muscle", ["b5", "b2", "b3"], force="10*tension"))
+    m.add(fb.Rope("cord", ["b0", "b5", "b7"], stiffness=8, length=2))
+    return m
+
+
+def test_tendons(tmp_path):
+    """Forces at random states, in MuJoCo and read back."""
+    m = tendons()
+    M, remarks = written(m, tmp_path / "tendons.xml")
+    assert not remarks
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        again = fb.load(tmp_path / "tendons.xml")
+    controls = {"motor": 2.0, "pull_it": -0.4, "turn": 1.5, "muscle": 0.7}
+    again.parameters.update({f"control_{k}": x for k, x in controls.items()})
+    p, r, D = m.prepare(coordinates="joint"), again.prepare(coordinates="joint"), mujoco.MjData(M)
+    D.ctrl = [controls[M.actuator(k).name.replace(" ", "_")] for k in range(M.nu)]
+    np.testing.assert_allclose(M.key_ctrl[0], D.ctrl)
+    x, y = (
+        convention(p, M),
+        r.convention("mujoco", joints=[M.joint(k).name.removesuffix("_free") for k in range(M.njnt)]),
+    )
+    M.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        q, (v, a) = p.step(p.q, 0.5 * rng.normal(size=len(p.v))), rng.normal(size=(2, len(p.v)))
+        D.qpos, D.qvel, D.qacc = x.from_flyball(q, v, a)
+        mujoco.mj_inverse(M, D)
+        mujoco.mj_fwdActuation(M, D)
+        theirs = D.qfrc_inverse - D.qfrc_actuator
+        forces = p.mass_matrix(q) @ a - p.forces(0.0, q, v)
+        np.testing.assert_allclose(x.forces_to_flyball(q, theirs), forces, atol=1e-10 * abs(forces).max())
+        q, v, a = y.to_flyball(D.qpos, D.qvel, D.qacc)
+        forces = r.mass_matrix(q) @ a - r.forces(0.0, q, v)
+        np.testing.assert_allclose(y.forces_to_flyball(q, theirs), forces, atol=1e-10 * abs(forces).max())
+
+
+def test_stops_of_tendons_and_couplings_of_three(tmp_path):
+    m = forest()
+    m.add(
+        fb.Limit("both", ["r.angle", "arm.angle"], weights=[1, 2], lower=-0.4),
+        fb.Brake("rubs", ["r.angle", "arm.angle"], weights=[1, 1], capacity=0.3),
+    )
+    m.add(
+        fb.Rope("leash", ["ground", "b6"], length=9),
+        fb.Coupler("sum", ["r.angle", "arm.angle", "p.displacement"], weights=[2, 1, 4], value=0.6),
+    )
+    _, remarks = written(m, tmp_path / "m.xml")
+    assert not remarks
+    again = fb.load(tmp_path / "m.xml")
+    assert (again["both_limit"].weights, again["both_limit"].lower) == ((1, 2), -0.4)
+    assert again["rubs_friction"].capacity == 0.3
+    assert again["leash_limit"].length == 9
+    (found,) = again.couplings
+    assert found.coordinates == ("r.angle", "arm.angle", "p.displacement")
+    np.testing.assert_allclose(np.array(found.weights) / found.weights[0] * 2, (2, 1, 4))
+    assert found.value / found.weights[0] * 2 == pytest.approx(0.6)
+
+
+def test_gears(tmp_path):
+    m = fb.Mechanism("gears", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=1), fb.Body("b", mass=1, inertia=1, position=(1, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "b", "ground", at=(1, 0), angle=0.3))
+    m.add(fb.GearPair("mesh", "A", "B", teeth=(20, 30)))
+    written(m, tmp_path / "m.xml")
+    again = fb.load(tmp_path / "m.xml")
+    for x in (m, again):
+        x.add(fb.Actuator("motor", "A.angle", force=1))
+    a, b = (x.simulate(0.5, outputs=3) for x in (m, again))
+    np.testing.assert_allclose(b["B.angle"], a["B.angle"], rtol=1e-9)
+    assert np.ptp(a["B.angle"]) > 0.05
+
+
+SHAPES = [
+    fb.Box(edges=(0.3, 0.2, 0.1), orientation=(0, 0, 0.3)),
+    fb.Sphere(radius=0.2),
+    fb.Capsule(radius=0.1, length=0.3, orientation=(0, 1.2, 0)),
+    fb.Cylinder(radius=0.1, length=0.05),
+    fb.Ellipsoid(semi_axes=(0.1, 0.2, 0.3)),
+    fb.Rod(start=(0, 0), end=(0.4, 0.1), radius=0.02),
+    fb.Tube(radius=0.1, inner_radius=0.07, length=0.2),
+    fb.Link(start=(0, 0), end=(0.4, 0.1), width=0.1, thickness=0.02),
+    fb.Prism(outline=((0, 0), (0.3, 0), (0.3, 0.1), (0.1, 0.1), (0.1, 0.3), (0, 0.3)), thickness=0.04),
+    fb.Cone(radius=0.1, height=0.3),
+    fb.Torus(radius=0.2, tube_radius=0.05),
+]
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
+def test_shapes(tmp_path, shape, planar):
+    """The corners of the picture, in the plane too; what has no geom of its own is a mesh. Holes are not drawn."""
+    at = (1, 2) if planar else (1, 2, 3)
+    turn = {"angle": 0.4} if planar else {"orientation": (0.4, 0.2, -0.3)}
+    if not planar:
+        shape = replace(shape, **{k: (*getattr(shape, k), 0) for k in ("start", "end") if hasattr(shape, k)})
+    hole = fb.Sphere(radius=0.001, hole=True)
+    m = fb.Mechanism("shapes", planar=planar)
+    m.add(fb.Body("b", density=1000, shape=(shape, hole), position=at, **turn))
+    m.add(fb.Ground("g", shape=replace(shape, looks=True), position=at, **turn))
+    M, remarks = written(m, tmp_path / "shapes.xml")
+    assert not remarks
+    assert M.ngeom == 2
+    again = fb.load(tmp_path / "shapes.xml")
+    mine, theirs = (np.concatenate([corners(x, e) for e in (*x.ground, *x.bodies) if e.shapes()]) for x in (m, again))
+    gaps = np.linalg.norm(mine[:, None] - theirs[None], axis=2)
+    assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-6  # MuJoCo's meshes have single precision
+
+
+def corners(m, e):
+    """Corners of the picture of a body or a part of ground, in the world as drawn."""
+    s, n, _ = checked_shapes(e, {}, m.planar)[0]
+    v = s.mesh(n)[0]
+    p, R = frame_of(e, resolve(e, {})) if isinstance(e, fb.Ground) else m.prepare().pose(e.name, m.prepare().q)
+    return p + v @ R.T

@@ -101,7 +101,118 @@ def test_what_is_not_used_is_listed(tmp_path):
     )
     path.write_text(text)
     with pytest.warns(
-        fb.ModelWarning, match=r"arm.urdf: not used: .*limit effort.*transmission.*gazebo.*base.stl in line 4"
+        fb.ModelWarning,
+        match=r"arm.urdf: not used: .*transmission.*limit effort.*gazebo.*in line 4: there is no file package://arm/base.stl",
+    ):
+        fb.load(path)
+
+
+MOTOR = """
+  <transmission name="gear">
+    <type>transmission_interface/SimpleTransmission</type>
+    <joint name="shoulder"><hardwareInterface>effort</hardwareInterface><offset>0.3</offset></joint>
+    <actuator name="motor-1"><mechanicalReduction>-50</mechanicalReduction></actuator>
+  </transmission>
+</robot>
+"""
+
+
+def test_a_transmission_is_a_motor_behind_gears(tmp_path):
+    """The joint's torque is the reduction times that of the motor, a parameter."""
+    m = read(tmp_path, ARM.replace("</robot>", MOTOR))
+    p = m.prepare(coordinates="joint")
+    q, v = np.array([0.3, 0.2]), np.array([0.5, -0.4])
+    free = p.forces(0.0, q, v)
+    assert m.parameters == {"control_motor_1": 0.0}
+    m.parameters["control_motor_1"] = 0.2
+    driven = m.prepare(coordinates="joint").forces(0.0, q, v)
+    np.testing.assert_allclose(driven - free, (-50 * 0.2, 0), atol=1e-12)
+    assert m["motor_1"].coordinate == "shoulder.angle"
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (("transmission_interface/SimpleTransmission", "DifferentialTransmission"), r"transmission of type DifferentialTransmission, which is not SimpleTransmission> \(line 30\)"),
+        (('joint name="shoulder"><', 'joint name="flange"><'), r"transmission of a fixed joint> \(line 30\)"),
+        (("", ""), r"<hardwareInterface> \(line 32\)"),
+    ],
+)  # fmt: skip
+def test_what_is_not_used_of_transmissions(tmp_path, change, match):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace("</robot>", MOTOR.replace(*change) if change[0] else MOTOR))
+    with pytest.warns(fb.ModelWarning, match=match):
+        fb.load(path)
+
+
+BOX = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+@pytest.mark.parametrize("scale", [(-1, 1, 1), (0.1, -2, -3), (-1, -1, -1), (1, 2, 3)])
+def test_scaled_and_mirrored_meshes(tmp_path, scale):
+    """A mirror image keeps its normals outwards: the volume by Gauss's theorem stays positive."""
+    (tmp_path / "box.obj").write_text(BOX)
+    text = ARM.replace(
+        '<box size="0.2 0.2 0.1"/>', f'<mesh filename="box.obj" scale="{scale[0]} {scale[1]} {scale[2]}"/>'
+    )
+    (mesh,) = read(tmp_path, text)["base_shape"].shapes()
+    t = mesh.triangulation
+    assert not t.flaws
+    assert t.integrals.volume == pytest.approx(abs(np.prod(scale)))
+    np.testing.assert_allclose(t.integrals.centre, np.array(scale) * (0.25, 0.5, 0.75), atol=1e-12)
+
+
+def collada(path, meter="0.01"):
+    """A red box of 1 by 2 by 3 units, written by trimesh."""
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("collada")
+    box = trimesh.creation.box((1, 2, 3))
+    box.visual.face_colors = [200, 10, 30, 255]
+    text = trimesh.exchange.dae.export_collada(box).decode()
+    path.write_text(text.replace("<asset>", f'<asset><unit name="unit" meter="{meter}"/>'))
+
+
+def test_collada_meshes_have_their_unit_and_colour(tmp_path):
+    collada(tmp_path / "box.dae")
+    text = ARM.replace('name="slide"><', 'name="slide"><visual><geometry><mesh filename="box.dae" scale="1 -1 2"/></geometry></visual>'
+                       '<visual><geometry><mesh filename="box.dae"/></geometry></visual><')  # fmt: skip
+    m = read(tmp_path, text)
+    mirrored, plain = (x.triangulation for x in m["slide"].shapes())
+    np.testing.assert_allclose(np.ptp(plain.v, axis=0), (0.01, 0.02, 0.03), rtol=1e-12)
+    assert mirrored.integrals.volume == pytest.approx(2 * 6e-6) == 2 * plain.integrals.volume
+    assert plain.color == "#c80a1e"
+    m = read(tmp_path, text.replace(' scale="1 -1 2"', ""))
+    assert m["slide"].color == "#c80a1e"
+    blue = text.replace(' scale="1 -1 2"/></geometry>', '/></geometry><material name="blue"/>')
+    assert read(tmp_path, blue)["slide"].color == "#0000ff"
+
+
+@pytest.mark.parametrize(
+    ("mesh", "match"),
+    [
+        ('filename="box.dae" scale="1 0 1"', "<mesh> in line 4: it is scaled by 1 0 1, which leaves no solid"),
+        ('filename="none.dae"', "<mesh> in line 4: there is no file none.dae"),
+        ('filename="box.step"', "box.step is not of a kind that can be read: .stl, .obj, .ply, .off, .dae"),
+        ('filename="broken.dae"', "broken.dae' cannot be read as DAE"),
+    ],
+)
+def test_meshes_that_cannot_be_shown_are_listed_with_the_reason(tmp_path, mesh, match):
+    collada(tmp_path / "box.dae")
+    (tmp_path / "box.step").write_text("")
+    (tmp_path / "broken.dae").write_text("<COLLADA><library")
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace('<box size="0.2 0.2 0.1"/>', f"<mesh {mesh}/>"))
+    with pytest.warns(fb.ModelWarning, match=match):
+        fb.load(path)
+
+
+def test_without_pycollada_the_package_is_named(tmp_path, monkeypatch):
+    collada(tmp_path / "box.dae")
+    monkeypatch.setitem(__import__("sys").modules, "collada", None)
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace('<box size="0.2 0.2 0.1"/>', '<mesh filename="box.dae"/>'))
+    with pytest.warns(
+        fb.ModelWarning, match=r"reading .dae files takes the package collada: pip install 'flyball\[meshes\]'"
     ):
         fb.load(path)
 
@@ -137,6 +248,20 @@ def test_meshes_are_found_beside_the_package(tmp_path):
         (('lower="0.1" upper="0.3"', 'lower="0.4" upper="0.3"'), "limits of joint 'rail' are reversed: 0.4 to 0.3"),
         (('type="fixed"', 'type="continuous"'), "link 'tool' moves, and neither it nor a link beyond it has mass"),
         (('name="tool"', 'name="slide"'), "there are two links 'slide'"),
+        (('name="tool"', 'name=" "'), "line 17: a link has an empty name"),
+        (('<mass value="2"/>', '<mass value="1_0"/>'), "line 8: value='1_0' of <mass>: a finite number is needed"),
+        (('<mass value="2"/>', '<mass value="2"/><mass value="3"/>'), "line 8: <inertial> of 'upper-arm' has a second <mass>; leave one out"),
+        (('<axis xyz="1 0 0"/>', '<axis xyz="1 0 0"/><axis xyz="0 1 0"/>'), "line 23: <joint> of 'rail' has a second <axis>"),
+        (('<axis xyz="1 0 0"/>', '<mimic joint="rail"/>'), "joint 'rail' follows itself"),
+        (('<axis xyz="1 0 0"/>', '<mimic joint="shoulder" multiplier="0"/>'), "line 23: the multiplier of joint 'rail' is 0"),
+        (("<robot", '<!DOCTYPE r [<!ENTITY a "' + 1000 * "a" + '"><!ENTITY b "' + 1000 * "&a;" + '"><!ENTITY c "' + 1000 * "&b;" + '">]><robot title="&c;"'), "arm.urdf is no XML: limit on input amplification"),
+        (('version="1.0"', 'version="1.0" encoding="nonsense"'), "arm.urdf is no XML: unknown encoding: nonsense"),
+        (('<link name="tool"/>', '<xacro:arm/>'), "line 17: <xacro:arm> is a macro; expand the file first"),
+        (("</robot>", MOTOR.replace('"shoulder"', '"elbow"')), "line 32: transmission 'gear' drives the joint 'elbow', which does not exist"),
+        (("</robot>", MOTOR.replace("-50", "0")), "line 33: <mechanicalReduction> of transmission 'gear' is '0'; one finite number is needed, not 0"),
+        (("</robot>", MOTOR.replace("-50", "fifty")), "transmission 'gear' is 'fifty'; one finite number"),
+        (("</robot>", MOTOR.replace("</robot>", "") + MOTOR.replace("gear", "gear2").replace("motor-1", "motor-2")), "transmissions 'gear' and 'gear2' drive one joint, 'shoulder'"),
+        (("</robot>", MOTOR.replace("<actuator ", "<actuator name='x'/><actuator ")), "line 30: transmission 'gear' has 2 <actuator>; a SimpleTransmission has one"),
     ],
 )  # fmt: skip
 def test_errors_name_file_line_and_element(tmp_path, change, match):
@@ -251,3 +376,58 @@ def test_equal_limits_fix_a_joint(tmp_path):
     assert not len(p.v)
     along = (np.cos(0.5), 0, -np.sin(0.5))
     np.testing.assert_allclose(p.pose("tool", [])[0], [0, 0.1, 0.4] + 0.9 * np.array(along), atol=1e-14)
+
+
+def test_motors_and_shapes_are_written_and_what_is_not_has_a_reason(tmp_path):
+    """Motors are simple transmissions; holes are not drawn; rods are cylinders, tubes have no counterpart."""
+    m = fb.Mechanism("arm", gravity=(0, 0, -9.80665), parameters={"u": 0.2})
+    rod = fb.Rod(start=(0, 0, 0), end=(0.4, 0, 0), radius=0.02, looks=True)
+    hole, tube = fb.Box(edges=(0.01, 0.01, 0.01), hole=True), fb.Tube(radius=0.1, inner_radius=0.05, length=0.2)
+    m.add(fb.Body("a", mass=2, inertia=(0.1, 0.1, 0.1), shape=(rod, tube)))
+    m.add(fb.Body("b", density=100, shape=(fb.Box(edges=(0.1, 0.2, 0.3)), hole), position=(1, 0, 0)))
+    m.add(
+        fb.Revolute("J", "ground", "a", at=(0, 0, 0), axis=(0, 1, 0)),
+        fb.Revolute("K", "a", "b", at=(1, 0, 0), axis=(0, 1, 0)),
+    )
+    m.add(
+        fb.Motor("drive", "J", torque="-30*u"), fb.Motor("other", "J", torque=2), fb.Ground("floor", shape=fb.Plane())
+    )
+    m.add(fb.Limit("soft", "K.angle", lower=0, stiffness=3), fb.Sensor("angle", "K.angle"))
+    reasons = (
+        r"Ground 'floor' \(ground has no shapes in URDF\), Sensor 'angle' \(the file describes the motion only\), Motor 'other' "
+        r"\(URDF has damping and friction of joints and simple transmissions\), Limit 'soft' \(URDF has rigid stops of "
+        r"joints\), Tube of a \(URDF has boxes, cylinders, spheres and mesh files\)"
+    )
+    with pytest.warns(fb.ModelWarning, match=reasons):
+        m.save(tmp_path / "arm.urdf")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fb.ModelWarning)
+        n = fb.load(tmp_path / "arm.urdf")
+    assert n["drive"].coordinate == "J.angle" and n["drive"].force == "-30.0*control_drive"
+    (shape,) = n["a"].shapes()
+    assert (shape.radius, shape.length) == (0.02, 0.4)
+    np.testing.assert_allclose(shape.position, (0.2, 0, 0), atol=1e-15)
+    assert len(n["b"].shapes()) == 1
+    assert n["b"].mass == pytest.approx(100 * (0.006 - 1e-6))
+
+
+def test_odd_but_sound_files(tmp_path):
+    """UTF-16, axes that are not of unit length, names of meshes that no file can have, a long chain without masses."""
+    path = tmp_path / "arm.urdf"
+    text = ARM.replace('<axis xyz="0 2 0"/>', '<axis xyz="0 1e200 0"/>')
+    mesh = f'<mesh filename="{5000 * "x"}.stl"/>'
+    for encoding, box in (("utf-8", "<geometry/>"), ("utf-16", f"<geometry>{mesh}</geometry>")):
+        path.write_bytes(text.replace('<geometry><box size="0.2 0.2 0.1"/></geometry>', box).encode(encoding))
+        with pytest.warns(
+            fb.ModelWarning, match=r"cannot be drawn \(<(geometry> in line 4: it is empty|mesh> in line 4: there is no)"
+        ):
+            m = fb.load(path)
+        np.testing.assert_allclose(m["shoulder"].axis, (0, 1, 0), atol=1e-15)
+    links = "".join(f'<link name="l{k}"/>' for k in range(1100))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
+        for k in range(1099)
+    )
+    path.write_text(f'<robot name="r">{links}{joints}</robot>')
+    with pytest.raises(fb.ModelError, match="link 'l1' moves, and neither it nor a link beyond it has mass"):
+        fb.load(path)

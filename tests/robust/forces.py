@@ -73,6 +73,14 @@ def _rope(d: Dice, m: fb.Mechanism, name: str, i: str, j: str, p, stiff: bool):
     return fb.Rope(name, bodies, at=points, stiffness=stiffness(d, stiff), damping=d.pick([0, 1.0]), length=length)
 
 
+def _path_spring(d: Dice, m: fb.Mechanism, name: str, i: str, j: str, p, stiff: bool):
+    points = [p, plus(p, d.size(0.1, 1.0), d.direction())]
+    points.append(plus(points[-1], d.size(0.1, 1.0), d.direction()))
+    length = d.pick([None, d.size(0.1, 2.0)])
+    force = d.pick([None, law(d, m, 5.0, ("length", "rate"))])
+    return fb.PathSpring(name, [i, j, i], at=points, stiffness=stiffness(d, stiff), length=length, force=force)
+
+
 def _along(kind: str, ending: str, coordinate: bool):
     """A force along a coordinate of some joint, or of some body."""
 
@@ -157,6 +165,7 @@ FORCES = {
     "SpringDamper": _spring,
     "Bushing": _bushing,
     "Rope": _rope,
+    "PathSpring": _path_spring,
     "PointForce": _point_force,
     "PointTorque": _point_torque,
     "CoordinateSpring": _along("CoordinateSpring", "", True),

@@ -15,6 +15,7 @@ from ..model.controller import Controller, ControlState
 from ..model.element import Laws, Name, Number, element, python_data
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import number
+from ..model.units import split_quantity
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -91,7 +92,8 @@ class JointController(Controller):
         for name in (*((self.base,) if self.base else ()), *self.ignored):
             model.body(name, self)
         env = model.environment()
-        values = {k: number(x, env, None, f"parameter {k!r} of {self.title}") for k, x in self.parameters}
+        units = {k: (split_quantity(text) or ("", ""))[1] for k, text in env.written.items()}
+        values = {k: number(x, env, units.get(k), f"parameter {k!r} of {self.title}") for k, x in self.parameters}
         model.environment(values)
 
     def given(self) -> dict[str, Any]:

@@ -411,6 +411,13 @@ def _controlled_velocities(s: Structure, e: JointController) -> list[int]:
         )
     names = [n.name for n in velocity_names(s)]
     free = [n for n in names if n not in e.coordinates]
+    balls = [s.model[name].title for name, t in s.tree_joints.items() if any(p.kind == "S" for p in t.primitives)]
+    if balls and free:
+        raise ModelError(
+            f"{e.title}: its model has ball joints, {', '.join(balls)}, and it controls coordinates of one velocity "
+            f"each; put three Revolute joints with massless bodies between them in place of a ball joint, or leave "
+            f"the bodies beyond it out of the model, ignored=[...]"
+        )
     if free:
         raise ModelError(
             f"{e.title}: its model has coordinates that it does not control: {', '.join(free)}; add them to "

@@ -84,6 +84,7 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .motor import Motor as Motor
     from .one_way import OneWay as OneWay
     from .one_way import Ratchet as Ratchet
+    from .path_spring import PathSpring as PathSpring
     from .point_force import PointForce as PointForce
     from .point_torque import PointTorque as PointTorque
     from .rope import Rope as Rope

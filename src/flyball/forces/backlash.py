@@ -12,12 +12,11 @@ from ..errors import ModelError
 from ..model.contact import check_restitution
 from ..model.element import Number, Numbers, Ratio, Unit, element, positive
 from ..model.force import Switch, Unilateral, check_elastic
+from ..model.joint import WEIGHT_UNITS, check_weights
 from .limit import KIND, effort, energy, stop_parameters, stop_switch_numbers
 
 if TYPE_CHECKING:
     from ..model.model import Model
-
-WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # permitted units of weights
 
 
 @element
@@ -63,7 +62,7 @@ class Backlash(Unilateral):
     damping: Annotated[Number, Unit(None)] = 0.0
 
     kind: ClassVar[int] = KIND
-    kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHTS}
+    kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHT_UNITS}
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = Unilateral.dimensions | {"gap": ("m", "rad"), "middle": ("m", "rad")}
@@ -74,8 +73,12 @@ class Backlash(Unilateral):
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Return the weights relative to the first."""
-        given = n.weights if n.weights is not None else (1.0, -1.0)[: len(self.coordinates)]
+        given = self._weights(n)
         return tuple(w / given[0] for w in given)
+
+    def _weights(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """Return the weights as given, or those of a difference."""
+        return (1.0, -1.0)[: len(self.coordinates)] if n.weights is None else n.weights
 
     def total(self, n: SimpleNamespace) -> Any:
         """Return the sum in the middle of the play; None: that of the reference configuration."""
@@ -97,17 +100,9 @@ class Backlash(Unilateral):
         check_elastic(self, n)
         if not self.coordinates:
             raise ModelError(f"{self.title}: it names no coordinates; give one or more")
-        twice = [c for k, c in enumerate(self.coordinates) if c in self.coordinates[:k]]
-        if twice:
-            raise ModelError(f"{self.title}: it names {twice[0]!r} twice; name it once, with both weights added up")
         if n.weights is None and len(self.coordinates) > 2:
             raise ModelError(f"{self.title}: {len(self.coordinates)} coordinates need weights; give weights=")
-        if n.weights is not None and len(n.weights) != len(self.coordinates):
-            raise ModelError(
-                f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"
-            )
-        if n.weights is not None and not all(w != 0.0 for w in n.weights):
-            raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")
+        check_weights(self, self.coordinates, self._weights(n))
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the parameters of the formulas."""

@@ -12,8 +12,8 @@ from ..compiler.formulas import formula
 from ..constraints.switches.friction import FRICTION
 from ..errors import ModelError
 from ..math.scalar import choose
-from ..model.element import Law, LawOf, Ratio, element
-from ..model.force import CoordinateForce, Switch
+from ..model.element import Coordinates, Law, LawOf, Numbers, Ratio, Unit, element
+from ..model.force import AlongSum, CoordinateForce, Switch
 from .joint_friction import SLIDING
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ class CapacityFriction:
 
     def switches(self) -> tuple[Switch, ...]:
         """Return one friction switch."""
-        return (Switch(FRICTION, along=self.along(), slides=True),)
+        weighted = getattr(self, "weights", None) is not None
+        return (Switch(FRICTION, along=self.along(), slides=True, weighted=weighted),)
 
     def check(self, n: SimpleNamespace) -> None:
         """Require a static ratio of at least 1."""
@@ -66,7 +67,7 @@ class CapacityFriction:
 
 
 @element
-class Brake(CapacityFriction, CoordinateForce):
+class Brake(AlongSum, CapacityFriction, CoordinateForce):
     """A brake along a coordinate: it locks the coordinate, or slips if the load exceeds its capacity.
 
     While slipping it acts with its capacity against the motion; at rest it can hold ``static`` times that. A locked
@@ -75,8 +76,11 @@ class Brake(CapacityFriction, CoordinateForce):
     Parameters
     ----------
     name : str
-    coordinate : str
+    coordinate : str or list of str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
+        With ``weights`` a list: the brake acts along their sum.
+    weights : list of numbers
+        One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
     capacity : law [N m] or [N]
         An expression of ``t``, ``value``, ``rate``, sensors and parameters; never negative.
     static : number [1]
@@ -90,15 +94,17 @@ class Brake(CapacityFriction, CoordinateForce):
         If it becomes negative in a motion.
     """
 
-    coordinate: str = field(kw_only=False)
+    coordinate: Coordinates = field(kw_only=False)
+    weights: Annotated[Numbers | None, Unit(None)] = None
     capacity: Annotated[Law, LawOf(None, ("value", "rate"))]
     static: Ratio = 1.0
 
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 
-    def coordinate_text(self) -> str:
-        """Return the coordinate as given."""
-        return self.coordinate
+    def check(self, n: SimpleNamespace) -> None:
+        """Require weights for a sum of coordinates, and a static ratio of at least 1."""
+        self.check_sum(n)
+        super().check(n)
 
 
 @element

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 
 from ..compiler.formulas import formula
 from ..errors import ModelError
-from ..model.element import Law, LawOf, Number, Unit, element, nonnegative
-from ..model.force import CoordinateForce
+from ..model.element import Coordinates, Law, LawOf, Number, Numbers, Unit, element, nonnegative
+from ..model.force import AlongSum, CoordinateForce
 
 KIND = 1
 
@@ -27,7 +27,7 @@ def energy(par, x):
 
 
 @element
-class CoordinateSpring(CoordinateForce):
+class CoordinateSpring(AlongSum, CoordinateForce):
     """Spring and damper along a coordinate, for instance of a prismatic joint, or a point's height.
 
     The force (or torque) -k (x - rest) - c rate acts along the coordinate; full turns of angles are counted.
@@ -35,9 +35,12 @@ class CoordinateSpring(CoordinateForce):
     Parameters
     ----------
     name : str
-    coordinate : str
+    coordinate : str or list of str
         ``"joint.coordinate"`` such as ``"slide.displacement"``, or a world coordinate of a body's or frame's origin
         such as ``"block.y"``.
+        With ``weights`` a list: the element acts along their sum.
+    weights : list of numbers
+        One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
     stiffness : number [N/m] or [N m/rad]
     damping : number [N s/m] or [N m s/rad]
     rest : number [m] or [rad]
@@ -46,7 +49,8 @@ class CoordinateSpring(CoordinateForce):
         Added force, an expression of ``t``, ``value``, ``rate``, sensors and parameters.
     """
 
-    coordinate: str = field(kw_only=False)
+    coordinate: Coordinates = field(kw_only=False)
+    weights: Annotated[Numbers | None, Unit(None)] = None
     stiffness: Annotated[Number, Unit(None)] = 0.0
     damping: Annotated[Number, Unit(None)] = 0.0
     rest: Annotated[Number, Unit(None)] = 0.0
@@ -57,12 +61,9 @@ class CoordinateSpring(CoordinateForce):
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
-    def coordinate_text(self) -> str:
-        """Return the coordinate as given."""
-        return self.coordinate
-
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness and damping must not be negative."""
+        self.check_sum(n)
         nonnegative(self, n, "stiffness", "damping")
         refuse_without_stiffness(self, "rest", 0.0)
 
@@ -79,34 +80,38 @@ class CoordinateSpring(CoordinateForce):
         return self.force is None and self.damping == 0.0
 
 
-def measuring_spring(name: str, coordinate: str) -> CoordinateSpring:
-    """Return a spring of zero stiffness, whose only purpose is to measure its coordinate."""
-    return CoordinateSpring(name, coordinate)
+def measuring_spring(e: Any) -> CoordinateSpring:
+    """Return a spring of zero stiffness, whose only purpose is to measure the quantity along which an element acts."""
+    return CoordinateSpring(e.name, e.coordinate, weights=e.weights)
 
 
 @element
-class Actuator(CoordinateForce):
+class Actuator(AlongSum, CoordinateForce):
     """A force or torque along a coordinate by a law: a hydraulic cylinder in a prismatic joint, a controller.
 
     Parameters
     ----------
     name : str
-    coordinate : str
+    coordinate : str or list of str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
+        With ``weights`` a list: the element acts along their sum.
+    weights : list of numbers
+        One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
     force : law [N] or [N m]
         An expression of ``t``, ``value``, ``rate``, sensors and parameters: ``"kp*(0.2 - value) - kd*rate"``.
     """
 
-    coordinate: str = field(kw_only=False)
+    coordinate: Coordinates = field(kw_only=False)
+    weights: Annotated[Numbers | None, Unit(None)] = None
     force: Annotated[Law, LawOf(None, ("value", "rate"))]
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
-    def coordinate_text(self) -> str:
-        """Return the coordinate as given."""
-        return self.coordinate
+    def check(self, n: SimpleNamespace) -> None:
+        """Require weights for a sum of coordinates."""
+        self.check_sum(n)
 
     def laws(self) -> tuple[Law | None, ...]:
         """Return the force law."""

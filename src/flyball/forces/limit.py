@@ -15,8 +15,8 @@ from ..constraints.switches.switch_kind import FROZEN
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
-from ..model.element import Number, Ratio, Unit, element
-from ..model.force import Switch, Unilateral, check_elastic
+from ..model.element import Coordinates, Number, Numbers, Ratio, Unit, element
+from ..model.force import AlongSum, Switch, Unilateral, check_elastic
 
 KIND = 8
 
@@ -60,7 +60,7 @@ def stop_switch_numbers(n: SimpleNamespace, lower: float | None, upper: float | 
 
 
 @element
-class Limit(Unilateral):
+class Limit(AlongSum, Unilateral):
     """Stops of a coordinate: it stays between ``lower`` and ``upper``.
 
     A rigid stop reflects an impact at the speed v with ``restitution`` times v. An elastic stop (``stiffness``) pushes
@@ -69,9 +69,11 @@ class Limit(Unilateral):
     Parameters
     ----------
     name : str
-    coordinate : str
+    coordinate : str or list of str
         ``"joint.coordinate"`` such as ``"knee.angle"``, or a world coordinate of a body's or frame's origin such as
-        ``"slider.x"``.
+        ``"slider.x"``. With ``weights`` a list: the stops are those of the sum.
+    weights : list of numbers
+        One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
     lower, upper : number [rad] or [m]
         Least and greatest value; no stop on a side that is not given.
     restitution : number [1]
@@ -87,7 +89,8 @@ class Limit(Unilateral):
     and ``closed``: 1 at the lower stop, -1 at the upper, 0 between. ``run.events`` lists each hit.
     """
 
-    coordinate: str = field(kw_only=False)
+    coordinate: Coordinates = field(kw_only=False)
+    weights: Annotated[Numbers | None, Unit(None)] = None
     lower: Annotated[Number | None, Unit(None)] = None
     upper: Annotated[Number | None, Unit(None)] = None
     restitution: Ratio | None = None
@@ -99,12 +102,9 @@ class Limit(Unilateral):
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = Unilateral.dimensions | {"lower": ("m", "rad"), "upper": ("m", "rad")}
 
-    def coordinate_text(self) -> str:
-        """Return the coordinate as given."""
-        return self.coordinate
-
     def check(self, n: SimpleNamespace) -> None:
         """Require at least one stop, rigid or elastic."""
+        self.check_sum(n)
         check_restitution(self, n)
         check_elastic(self, n)
         if self.lower is None and self.upper is None:
@@ -122,8 +122,9 @@ class Limit(Unilateral):
         return stop_parameters(n, n.lower, n.upper)
 
     def switches(self) -> tuple[Switch, ...]:
-        """Return one switch along the coordinate."""
-        return (Switch(ELASTIC if self.acts() else STOP, along=(self.coordinate,), slides=self.acts()),)
+        """Return one switch along the coordinate or sum."""
+        kind = ELASTIC if self.acts() else STOP
+        return (Switch(kind, along=self.along(), slides=self.acts(), weighted=self.weights is not None),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Return the bounds, and the properties of the stops."""

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import field, replace
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
-
-import numpy as np
-from pydantic import BeforeValidator
+from typing import ClassVar
 
 from ..compiler.formulas import formula
-from ..constraints.blocks import DISTANCE, Row
 from ..constraints.switches.elastic_stop import ELASTIC
 from ..constraints.switches.stop import STOP
 from ..constraints.switches.switch_kind import FROZEN
-from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
-from ..model.element import Damping, Length, Numbers, Ratio, Stiffness, Unit, element, nonnegative
-from ..model.force import CoordinateForce, Switch, check_elastic
-from ..model.geometry import vector
-from ..model.joint import WorldFrame
+from ..model.element import Damping, Length, Ratio, Stiffness, element, nonnegative
+from ..model.force import PathForce, Switch, check_elastic
 from .limit import stop_switch_numbers
 
 KIND = 2
@@ -48,17 +40,12 @@ def energy(par, x):
     return 0.5 * par[0] * stretch * stretch
 
 
-def _list(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
 _WORDS = {"closing": ("taut", "goes taut"), "opening": ("slack", "goes slack"), "states": ("taut", "slack")}
 RIGID_ROPE, ELASTIC_ROPE = replace(STOP, **_WORDS), replace(ELASTIC, **_WORDS)  # type: ignore[arg-type]
-Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
 
 
 @element
-class Rope(CoordinateForce):
+class Rope(PathForce):
     """A rope that runs without friction over points of bodies: the tension is the same everywhere.
 
     With a stiffness it is elastic: the tension is k (l - length) + c ldot while the rope is longer than its free length
@@ -87,8 +74,6 @@ class Rope(CoordinateForce):
     A result contains ``length``, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack.
     """
 
-    bodies: tuple[str, ...] = field(kw_only=False)
-    at: Points | None = None
     stiffness: Stiffness | None = None
     damping: Damping = 0.0
     length: Length | None = None
@@ -97,39 +82,12 @@ class Rope(CoordinateForce):
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
-    sign: ClassVar[float] = -1.0
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N", "taut": "1"}
-    symbol: ClassVar[str] = "rope"
     single: ClassVar[str] = "rope"
-    fails: ClassVar[str] = "Two neighbouring points of it coincide, where the rope between them has no direction"
-
-    def ends(self) -> dict[str, str]:
-        """Return one frame for each point."""
-        return {f"P{k}": name for k, name in enumerate(self.bodies)}
-
-    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Return the points in the reference configuration."""
-        if n.at is None:
-            return None
-        points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
-        for k, (a, b) in enumerate(itertools.pairwise(points)):
-            if not (a.real != b.real).any():
-                raise ModelError(
-                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.real.tolist())} m, where the rope "
-                    f"between them has no direction; move one, or leave it out"
-                )
-        return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}
-
-    def path(self) -> tuple[tuple[str, str, Row], ...]:
-        """Return the terms: the distance from each point to the next."""
-        return tuple((f"P{k}", f"P{k + 1}", DISTANCE) for k in range(len(self.bodies) - 1))
 
     def check(self, n: SimpleNamespace) -> None:
         """Require enough points, and valid constants."""
-        if len(self.bodies) < 2:
-            raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}; name the second")
-        if n.at is not None and len(n.at) != len(self.bodies):
-            raise ModelError(f"{self.title}: {len(self.bodies)} bodies need as many points in 'at', got {len(n.at)}")
+        super().check(n)
         check_restitution(self, n)
         check_elastic(self, n, "a rope that does not stretch")
         nonnegative(self, n, "length")

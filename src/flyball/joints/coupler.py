@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..errors import ModelError
 from ..model.element import Number, Numbers, Unit, element
-from ..model.joint import Coupling
+from ..model.joint import WEIGHT_UNITS, Coupling, check_weights
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
-WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # permitted units of weights
 SUMS = ("1", "m", "rad")
 
 
@@ -39,7 +38,7 @@ class Coupler(Coupling):
     weights: Annotated[Numbers, Unit(None)]
     value: Annotated[Number | None, Unit(None)] = None
 
-    dimensions: ClassVar = {"weights": WEIGHTS, "value": SUMS}
+    dimensions: ClassVar = {"weights": WEIGHT_UNITS, "value": SUMS}
 
     def coupled(self) -> tuple[str, ...]:
         """Return the coordinates."""
@@ -62,12 +61,4 @@ class Coupler(Coupling):
         if len(self.coordinates) < 2:
             one = "1 coordinate" if self.coordinates else "no coordinates"
             raise ModelError(f"{self.title}: it couples {one}; give two or more")
-        twice = [c for k, c in enumerate(self.coordinates) if c in self.coordinates[:k]]
-        if twice:
-            raise ModelError(f"{self.title}: it names {twice[0]!r} twice; name it once, with both weights added up")
-        if len(n.weights) != len(self.coordinates):
-            raise ModelError(
-                f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"
-            )
-        if not all(w != 0.0 for w in n.weights):
-            raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")
+        check_weights(self, self.coordinates, n.weights)

@@ -274,7 +274,7 @@ class Prepared(RecursiveMethods):
         """
         x = self._recursive
         if circles is None and program == "pinocchio":
-            circles = continuous_joints(x, {e.coordinate for e in self.model.limits if isinstance(e, Limit)})
+            circles = continuous_joints(x, {e.coordinate_text() for e in self.model.limits if isinstance(e, Limit)})
         return convention(x, program, joints, circles)
 
     def __getstate__(self) -> dict[str, Any]:

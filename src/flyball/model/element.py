@@ -64,6 +64,10 @@ def python_data(value: Any) -> Any:
     return value
 
 
+def _list(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
 def _flag(value: Any) -> Any:
     """Accept only true and false: no "yes", no 1."""
     if hasattr(value, "item"):
@@ -86,6 +90,8 @@ Name = Annotated[str, BeforeValidator(_name)]
 Number = Annotated[float | str, BeforeValidator(python_data)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(python_data)]
+Coordinates = Annotated[str | tuple[str, ...], BeforeValidator(_list)]
+"""A coordinate such as ``"A.angle"``, or several."""
 Function = Callable[..., Any]
 Law = Annotated[float | str | Function, BeforeValidator(python_data)]
 """A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
@@ -99,6 +105,7 @@ Density = Annotated[Number, Unit("kg/m^3")]
 Stiffness = Annotated[Number, Unit("N/m")]
 Damping = Annotated[Number, Unit("N*s/m")]
 Point = Annotated[Numbers, Unit("m"), Vector()]
+Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
 PointPair = Annotated[tuple[Numbers, Numbers], Unit("m"), Vector()]
 Direction = Annotated[Numbers, Unit(""), Vector()]
 Directions = Annotated[tuple[Numbers, Numbers], Unit(""), Vector()]

@@ -21,7 +21,7 @@ from .body import Driver
 from .controller_signals import controller_states
 from .element import LawOf, fields_with
 from .expressions import Expression
-from .force import Force
+from .force import CoordinateForce, Force
 from .model import Model, listing, suggest
 
 AXES = "xyz"
@@ -75,8 +75,8 @@ def _input_unit(model: Model, e: Driver | Force, of: LawOf) -> str:
     """Return the unit of the added term; an effort along a coordinate is a force or a torque."""
     if of.dimension:
         return of.dimension
-    along = getattr(e, "coordinate", None)
-    return "SI" if along is None else {"m": "N", "rad": "N*m"}.get(model.unit(along, e), "SI")
+    along = e.along() if isinstance(e, CoordinateForce) else (e.coordinate,) if isinstance(e, Driver) else ()
+    return {"m": "N", "rad": "N*m"}.get(model.unit(along[0], e), "SI") if along else "SI"
 
 
 def possible_inputs(model: Model) -> dict[str, tuple[Any, str, int, LawOf]]:

@@ -6,6 +6,7 @@ have a quantity that is free on one side, and constrained or pushed on the other
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
@@ -13,13 +14,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..constraints.blocks import Row
+from ..constraints.blocks import DISTANCE, Row
 from ..constraints.registry import no_inputs
 from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
-from .element import Element, Law, Point, PointPair, nonnegative, positive
+from .element import Element, Law, Point, PointPair, Points, nonnegative, positive
 from .geometry import vector
-from .joint import WorldFrame
+from .joint import WEIGHT_UNITS, WorldFrame, check_weights
 
 if TYPE_CHECKING:
     from .model import Model
@@ -190,6 +191,84 @@ class CoordinateForce(Force):
     def on_points(self) -> bool:
         """Return whether its terms depend on points only."""
         return all(set("FM") <= set(formula.of_kind.points) for _, _, formula in self.path())
+
+
+class AlongSum:
+    """Base class of elements along one coordinate (``coordinate``), or along a sum of several with ``weights``."""
+
+    title: str
+    coordinate: str | tuple[str, ...]
+
+    kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHT_UNITS}
+
+    def coordinate_text(self) -> str:
+        """Return the coordinate as given; empty for a sum."""
+        return self.coordinate if isinstance(self.coordinate, str) else ""
+
+    def along(self) -> tuple[str, ...]:
+        """Return the coordinates."""
+        return (self.coordinate,) if isinstance(self.coordinate, str) else self.coordinate
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Return the weights as given; none for one coordinate."""
+        return n.weights or ()
+
+    def check_sum(self, n: SimpleNamespace) -> None:
+        """Require weights for a sum, and none for one coordinate."""
+        if isinstance(self.coordinate, str):
+            if n.weights is not None:
+                raise ModelError(
+                    f"{self.title}: weights are for a sum of coordinates; give a list of coordinates too, or leave "
+                    f"weights out"
+                )
+            return
+        if not self.coordinate:
+            raise ModelError(f"{self.title}: it names no coordinate; give one, or several with weights")
+        if n.weights is None:
+            raise ModelError(f"{self.title}: a sum of coordinates needs weights; give weights=, one for each")
+        check_weights(self, self.coordinate, n.weights)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class PathForce(CoordinateForce):
+    """A force along the length of a path: straight from each of two or more points to the next."""
+
+    bodies: tuple[str, ...]
+    _: KW_ONLY
+    at: Points | None = None
+
+    sign: ClassVar[float] = -1.0
+    outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N"}
+    symbol: ClassVar[str] = "rope"
+    fails: ClassVar[str] = "Two neighbouring points of it coincide, where the line between them has no direction"
+
+    def ends(self) -> dict[str, str]:
+        """Return one frame for each point."""
+        return {f"P{k}": name for k, name in enumerate(self.bodies)}
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Return the points in the reference configuration."""
+        if n.at is None:
+            return None
+        points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
+        for k, (a, b) in enumerate(itertools.pairwise(points)):
+            if not (a.real != b.real).any():
+                raise ModelError(
+                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.real.tolist())} m, where the line "
+                    f"between them has no direction; move one, or leave it out"
+                )
+        return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}
+
+    def path(self) -> tuple[tuple[str, str, Row], ...]:
+        """Return the terms: the distance from each point to the next."""
+        return tuple((f"P{k}", f"P{k + 1}", DISTANCE) for k in range(len(self.bodies) - 1))
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Require enough points."""
+        if len(self.bodies) < 2:
+            raise ModelError(f"{self.title}: a path has two ends at least, got bodies {self.bodies}; name the second")
+        if n.at is not None and len(n.at) != len(self.bodies):
+            raise ModelError(f"{self.title}: {len(self.bodies)} bodies need as many points in 'at', got {len(n.at)}")
 
 
 @dataclass(frozen=True)

@@ -220,6 +220,27 @@ def _primitives(kind: type[Joint], planar: bool) -> tuple[Primitive, ...]:
     return tuple(p for p in flat if (p.kind == "R") == (p.axis == normal))
 
 
+WEIGHT_UNITS = ("1", "m", "m/rad", "rad/m", "1/m")
+"""Permitted units of the weights of a sum of coordinates."""
+
+
+def check_weights(e: Element, coordinates: tuple[str, ...], weights: tuple[float, ...]) -> None:
+    """Require a nonzero weight for each of different coordinates.
+
+    Raises
+    ------
+    ModelError
+        If the numbers of coordinates and weights differ, a coordinate occurs twice, or a weight is 0.
+    """
+    twice = [c for k, c in enumerate(coordinates) if c in coordinates[:k]]
+    if twice:
+        raise ModelError(f"{e.title}: it names {twice[0]!r} twice; name it once, with both weights added up")
+    if len(weights) != len(coordinates):
+        raise ModelError(f"{e.title}: {len(coordinates)} coordinates need as many weights, got {len(weights)}")
+    if not all(w != 0.0 for w in weights):
+        raise ModelError(f"{e.title}: a weight is 0, which couples nothing; got {weights}")
+
+
 @dataclass(frozen=True)
 class Coupling(Element):
     """One constraint row: a weighted sum of coordinates keeps its reference value.

@@ -89,7 +89,7 @@ class Model:
         self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
 
-    def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
+    def environment(self, changed: Mapping[str, Number | complex] | None = None) -> ParameterValues:
         """Return the values of the parameters in SI units, with some of them changed.
 
         Raises

@@ -243,7 +243,8 @@ def check_references(model: Model, e: Element) -> None:
 
 def _check_path(model: Model, e: CoordinateForce) -> None:
     """Require that the coordinate along which it acts exists and can move."""
-    for text in e.along() or ((e.coordinate,) if hasattr(e, "coordinate") else ()):
+    own = getattr(e, "coordinate", None)
+    for text in e.along() or ((own,) if isinstance(own, str) else ()):
         model.coordinate(text, e)
     carriers = [model.carrier(name, e) for name in e.ends().values()]
     if len(carriers) > 1 and len(set(carriers)) == 1:

@@ -11,17 +11,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
 from ..forces.rotor_inertia import RotorInertia
-from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
 from ..joints.spherical import Spherical
-from ..model.body import GROUND, Body, Frame, Ground
+from ..model.body import GROUND, Body, Frame, Ground, Initial
 from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
@@ -33,12 +34,17 @@ from ..model.shapes.mesh import Mesh
 from ..model.shapes.plane import Plane
 from ..model.shapes.solid import Solid
 from ..model.shapes.sphere import Sphere
-from .urdf import rows
+from .mjcf_tendons import Tendons, linear_relation
+from .robot_file import rows
 
 T = TypeVar("T", bound=Model)
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's kinds of joints (mjtJoint)."""
+ROUNDING = 1e-9
+"""Of poses in a file, relative to the size of the model."""
 COORDINATES = {SLIDE: "displacement", HINGE: "angle"}
+ON_JOINT, ON_TENDON = (0, 1), 3
+"""MuJoCo's kinds of transmissions (mjtTrn): along a joint, also in the parent's axes; along a tendon."""
 
 
 def load_mjcf(path: Path, make: Callable[..., T]) -> T:
@@ -54,16 +60,16 @@ def load_mjcf(path: Path, make: Callable[..., T]) -> T:
     except ImportError:
         raise ModelError(f"{path}: MJCF is read by MuJoCo; install it: pip install 'flyball[mjcf]'") from None
     if not path.is_file():
-        raise ModelError(f"{path} cannot be read: there is no such file")
+        raise ModelError(f"{path} cannot be read: {'it is a folder' if path.is_dir() else 'there is no such file'}")
     try:
-        return _Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), path).mechanism(make)
+        return Reader(mujoco, mujoco.MjModel.from_xml_path(str(path)), path).mechanism(make)
     except ValueError as error:
         if isinstance(error, ModelError):
-            raise
+            raise type(error)(f"{path}: {error}") from None
         raise ModelError(f"{path}: {' '.join(str(error).split())}") from None
 
 
-class _Reader:
+class Reader:
     """One compiled model being read."""
 
     def __init__(self, mujoco: Any, model: Any, path: Path) -> None:
@@ -73,12 +79,17 @@ class _Reader:
         self.taken: set[str] = {GROUND}
         self.bodies: dict[int, str] = {0: GROUND}
         self.joints: dict[int, str] = {}
+        self.coordinates: dict[int, str] = {}  # of hinges and slides
+        self.sites: dict[int, str] = {}
         self.unused: list[str] = []
 
     def name(self, kind: str, k: int, default: str) -> str:
         """A name that flyball permits and that is not taken."""
-        given = self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k)
-        return self.free_name(given or default)
+        return self.free_name(self.given_name(kind, k) or default)
+
+    def given_name(self, kind: str, k: int) -> str:
+        """The name in the file; empty if there is none."""
+        return self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k) or ""
 
     def free_name(self, wanted: str) -> str:
         """The name, with other characters where Python permits none, and not one that is taken."""
@@ -103,6 +114,8 @@ class _Reader:
         m.add(*later)
         for k in range(M.nsite):
             m.add(self._frame(k))
+        self.tendons = Tendons(self)
+        m.add(*self.tendons.elements())
         for k in range(M.neq):
             m.add(*self._equality(k))
         parameters: dict[str, float] = {}
@@ -116,6 +129,7 @@ class _Reader:
     def _frame(self, k: int) -> Frame:
         """A site as a frame."""
         name, body = self.name("SITE", k, f"site{k}"), self.bodies[self.M.site_bodyid[k]]
+        self.sites[k] = name
         p, R = self.D.site_xpos[k], self.D.site_xmat[k].reshape(3, 3)
         if body != GROUND:
             p, R = self.M.site_pos[k], quaternion_to_matrix(self.M.site_quat[k])
@@ -158,6 +172,8 @@ class _Reader:
     def _joint(self, j: int, first: str, second: str) -> Element:
         M = self.M
         name = self.joints[j] = self.name("JOINT", j, f"joint{j}")
+        if M.jnt_type[j] in COORDINATES:
+            self.coordinates[j] = f"{name}.{COORDINATES[M.jnt_type[j]]}"
         at, axis = tuple(self.D.xanchor[j].tolist()), tuple(self.D.xaxis[j].tolist())
         drawn = float(M.qpos0[M.jnt_qposadr[j]])
         if M.jnt_type[j] == BALL:
@@ -167,24 +183,27 @@ class _Reader:
         return Revolute(name, first, second, at=at, axis=axis, angle=drawn)
 
     def _losses(self, j: int) -> Iterator[Element]:
-        """Stops, spring, damping and friction of a joint."""
+        """Stops, spring, damping and friction of a joint, and an initial value if that of `qpos0` is not permitted."""
         M, d = self.M, self.M.jnt_dofadr[j]
         armature = M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]]
         if M.jnt_type[j] not in COORDINATES:
             if armature.any():
                 self.unused.append(f"armature of {self.joints.get(j, 'the free joint')}, which has no axis")
             if M.jnt_limited[j] or M.jnt_stiffness[j] or M.dof_damping[d] or M.dof_frictionloss[d]:
-                self.unused.append(f"limit, stiffness, damping or friction of {self.joints.get(j, 'the free joint')}")
+                whose = self.joints.get(j, "the free joint")
+                self.unused.append(f"limit, stiffness, damping or friction of {whose} (read of hinges and slides only)")
             return
         name = self.joints[j]
-        along = f"{name}.{COORDINATES[M.jnt_type[j]]}"
+        along = self.coordinates[j]
         if M.jnt_limited[j]:
             lower, upper = M.jnt_range[j].tolist()
             yield Limit(self.free_name(f"{name}_limit"), along, lower=lower, upper=upper)
+            if not lower <= M.qpos0[M.jnt_qposadr[j]] <= upper:
+                yield Initial(along, value=0.5 * (lower + upper))
         stiffness, damping, friction = (float(x) for x in (M.jnt_stiffness[j], M.dof_damping[d], M.dof_frictionloss[d]))
         if stiffness or damping:
             rest = float(M.qpos_spring[M.jnt_qposadr[j]])
-            given = {"stiffness": stiffness, "rest": rest} if stiffness else {}
+            given: dict[str, Any] = {"stiffness": stiffness, "rest": rest} if stiffness else {}
             yield CoordinateSpring(self.free_name(f"{name}_spring"), along, damping=damping, **given)
         if friction:
             yield Brake(self.free_name(f"{name}_friction"), along, capacity=friction)
@@ -194,42 +213,110 @@ class _Reader:
     def _equality(self, k: int) -> Iterator[Element]:
         """Equalities as hard joints: connect, weld, and linear relations of joints."""
         M, kinds = self.M, self.mujoco.mjtEq
+        kind = kinds(int(M.eq_type[k]))
         name = self.name("EQUALITY", k, f"equality{k}")
         a, b, data = M.eq_obj1id[k], M.eq_obj2id[k], M.eq_data[k]
-        bodies = M.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_BODY
+        relation: Element | None = None
         if not M.eq_active0[k]:
-            self.unused.append(f"equality {name}, which is not active")
-        elif M.eq_type[k] == kinds.mjEQ_CONNECT and bodies:
-            at = self.D.xpos[a] + self.D.xmat[a].reshape(3, 3) @ data[:3]
-            yield Spherical(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
-        elif M.eq_type[k] == kinds.mjEQ_WELD and bodies:
-            yield Fixed(name, self.bodies[a], self.bodies[b], at=tuple(self.D.xpos[a].tolist()))
-        elif M.eq_type[k] == kinds.mjEQ_JOINT and not data[2:5].any() and a in self.joints and b in self.joints:
-            ends = [f"{self.joints[j]}.{COORDINATES[M.jnt_type[j]]}" for j in (a, b)]
-            start = [float(M.qpos0[M.jnt_qposadr[j]]) for j in (a, b)]
-            value = float(data[0]) + start[0] - float(data[1]) * start[1]
-            yield Coupler(name, tuple(ends), weights=(1.0, -float(data[1])), value=value)
+            self.unused.append(f"equality {name} (it is not active)")
+        elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+            yield from self._closed_loop(name, k, kind == kinds.mjEQ_WELD)
+        elif kind not in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
+            self.unused.append(f"equality {name} (of flexible bodies)")
+        elif data[2:5].any():
+            self.unused.append(f"equality {name} (its polynomial is not linear)")
+        elif kind == kinds.mjEQ_TENDON:
+            relation = self.tendons.equality(name, int(a), int(b), float(data[0]), float(data[1]))
+            if relation is None:
+                self.unused.append(f"equality {name} (read of fixed tendons only)")
         else:
-            self.unused.append(f"equality {name}")
+            relation = self._joint_relation(name, int(a), int(b), float(data[0]), float(data[1]))
+        if relation is not None:
+            yield relation
+
+    def _closed_loop(self, name: str, k: int, weld: bool) -> Iterator[Element]:
+        """The joint of a connect or weld, of bodies as they are in `qpos0`, or of sites, which it brings together."""
+        M, D = self.M, self.D
+        a, b, data = int(M.eq_obj1id[k]), int(M.eq_obj2id[k]), M.eq_data[k]
+        joint = Fixed if weld else Spherical
+        if M.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_SITE:
+            yield joint(name, self.sites[a], self.sites[b])
+            return
+        if self.bodies[a] == self.bodies[b]:
+            self.unused.append(f"equality {name} (both its bodies are fixed to the world)")
+            return
+        at, R = D.xpos[a] + D.xmat[a].reshape(3, 3) @ data[:3], D.xmat[b].reshape(3, 3)
+        if weld:
+            at = D.xpos[a]
+            wanted = D.xmat[a].reshape(3, 3) @ quaternion_to_matrix(data[6:10])
+            gap = D.xpos[a] + D.xmat[a].reshape(3, 3) @ data[3:6] - D.xpos[b] - R @ data[:3]
+            if max(np.abs(gap).max() / M.stat.extent, np.abs(wanted - R).max()) > ROUNDING:
+                self.unused.append(f"relpose of equality {name} (bodies are welded as they are in qpos0)")
+        yield joint(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
+
+    def _joint_relation(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | None:
+        """Relation y - y0 = offset + slope (x - x0) of two joints, or of one (``second`` is -1)."""
+        y0, x0 = (float(self.M.qpos0[self.M.jnt_qposadr[j]]) if j >= 0 else 0.0 for j in (first, second))
+        weights = {self.coordinates[first]: 1.0} | ({self.coordinates[second]: -slope} if second >= 0 else {})
+        return linear_relation(name, weights, y0 + offset - (slope * x0 if second >= 0 else 0.0))
 
     def _actuators(self, parameters: dict[str, float]) -> Iterator[Element]:
-        """Actuators of joints: gear (gain control + bias), with the control as a parameter ``control_NAME``."""
-        M = self.M
-        for k in range(M.nu):
-            name = self.name("ACTUATOR", k, f"actuator{k}")
-            j = int(M.actuator_trnid[k, 0])
-            plain = M.actuator_dyntype[k] == 0 and M.actuator_gaintype[k] == 0 and M.actuator_biastype[k] <= 1
-            on_joint = M.actuator_trntype[k] in (0, 1) and j in self.joints and M.jnt_type[j] in COORDINATES
-            if not (plain and on_joint):
-                self.unused.append(f"actuator {name}")
+        """Actuators of joints and tendons, with the control as a parameter ``control_NAME``."""
+        M, clamped, controls = self.M, list[str](), self._controls()
+        for k in range(getattr(M, "nactuator", M.nu)):
+            given = self.given_name("ACTUATOR", k) or f"actuator{k}"
+            name = self.free_name(given)
+            if reason := self._no_law(k):
+                self.unused.append(f"actuator {name} ({reason})")
                 continue
-            gear, gain, bias = float(M.actuator_gear[k, 0]), float(M.actuator_gainprm[k, 0]), M.actuator_biasprm[k]
-            control = self.free_name(f"control_{name}")
-            parameters[control] = 0.0
-            force = f"{gear!r}*({gain!r}*{control}"
-            if M.actuator_biastype[k]:
-                force += f" + {float(bias[0])!r} + {float(bias[1])!r}*{gear!r}*value + {float(bias[2])!r}*{gear!r}*rate"
-            yield Actuator(name, f"{self.joints[j]}.{COORDINATES[M.jnt_type[j]]}", force=force + ")")
+            control, target = self.free_name(f"control_{given}"), int(M.actuator_trnid[k, 0])
+            found: Element | None = None
+            if M.actuator_trntype[k] in ON_JOINT and target in self.coordinates:
+                found = Actuator(name, self.coordinates[target], force=self._actuator_law(k, control))
+            elif M.actuator_trntype[k] == ON_TENDON:
+                found = self.tendons.actuator(name, target, lambda *of, k=k, c=control: self._actuator_law(k, c, *of))
+            if found is None:
+                self.unused.append(
+                    f"actuator {name} (it acts on neither a hinge, nor a slide, nor a tendon that is read)"
+                )
+                continue
+            parameters[control] = float(controls[getattr(M, "actuator_ctrladr", range(M.nu))[k]])
+            if M.actuator_ctrllimited[k] or M.actuator_forcelimited[k]:
+                clamped.append(name)
+            yield found
+        if clamped:
+            self.unused.append(
+                f"ranges of control and force of actuators ({', '.join(clamped)}: parameters have no range)"
+            )
+
+    def _controls(self) -> np.ndarray:
+        """Controls at the start: those of the only keyframe, if it is at rest in `qpos0`; else 0."""
+        M = self.M
+        if M.nkey == 1 and not M.key_qvel.any() and np.allclose(M.key_qpos[0], M.qpos0, rtol=0.0, atol=ROUNDING):
+            return M.key_ctrl[0]
+        if M.nkey:
+            self.unused.append(f"{M.nkey} keyframes (states are set by Initial)")
+        return np.zeros(M.nu)
+
+    def _no_law(self, k: int) -> str:
+        """Why an actuator's force is no linear law of its control, length and velocity; empty if it is one."""
+        M = self.M
+        if M.actuator_dyntype[k] != 0:
+            return "it has activation states"
+        if M.actuator_gaintype[k] != 0 or M.actuator_biastype[k] > 1:
+            return "its force is not linear in control, length and velocity"
+        if any(np.any(getattr(M, f"actuator_{x}", np.zeros(k + 1))[k]) for x in ("damping", "armature")):
+            return "it has damping or armature of its own"
+        return ""
+
+    def _actuator_law(self, k: int, control: str, value: str = "value", sign: float = 1.0) -> str:
+        """Force of an actuator: gear (gain control + bias), the bias linear in gear times value and rate."""
+        M = self.M
+        gear, gain, bias = float(M.actuator_gear[k, 0]), float(M.actuator_gainprm[k, 0]), M.actuator_biasprm[k]
+        force = f"{sign * gear!r}*({gain!r}*{control}"
+        if M.actuator_biastype[k]:
+            force += f" + {float(bias[0])!r} + {float(bias[1])!r}*{gear!r}*{value} + {float(bias[2])!r}*{gear!r}*rate"
+        return force + ")"
 
     def _shapes(self, b: int) -> Iterator[Solid]:
         """Shapes of a body, for display."""
@@ -257,14 +344,30 @@ class _Reader:
                 faces = M.mesh_face[at : at + M.mesh_facenum[k]]
                 yield Mesh(vertices=vertices.tolist(), faces=faces.tolist(), looks=True, **given)
             else:
-                self.unused.append(f"a geom of {self.mujoco.mj_id2name(M, self.mujoco.mjtObj.mjOBJ_BODY, b)}")
+                what = kinds(int(kind)).name.removeprefix("mjGEOM_").lower()
+                self.unused.append(f"geom {self.given_name('GEOM', g) or g} of {self.bodies.get(b, GROUND)} ({what})")
 
     def _report(self) -> None:
         M = self.M
-        counts = {"tendons": M.ntendon, "sensors": M.nsensor, "contact pairs": M.npair}
+        counts = {
+            "sensors": M.nsensor,
+            "contact pairs": M.npair,
+            "flexible bodies": getattr(M, "nflex", 0),
+            "plugins": M.nplugin,
+            "mocap bodies, which stay where they are": M.nmocap,
+        }
         for what, count in counts.items():
             if count:
                 self.unused.append(f"{count} {what}")
+        effects = {
+            "gravity compensation of bodies": M.body_gravcomp,
+            "forces of a fluid (density, viscosity, wind)": (M.opt.density, M.opt.viscosity),
+            "nonlinear stiffness or damping of joints": np.append(
+                *(np.ravel(getattr(M, what, 0.0)) for what in ("jnt_stiffnesspoly", "dof_dampingpoly"))
+            ),
+            "ranges of actuator forces of joints": M.jnt_actfrclimited,
+        }
+        self.unused += [what for what, values in effects.items() if np.any(values)]
         if (M.geom_contype | M.geom_conaffinity).any():
             self.unused.append("contact of geoms (add shapes without looks=True, and fb.Contact)")
         if self.unused:

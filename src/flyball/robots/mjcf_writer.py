@@ -2,8 +2,9 @@
 
 A body of MJCF is a body with the same reference frame; `qpos0` is the drawn configuration, and joints have the values
 they have in it (``ref``). A joint with several coordinates is a sequence of hinges and slides of one body. MuJoCo's
-constraints are soft: equalities are as hard as it permits. What the format cannot express is listed in a
-`ModelWarning`, or refused where joints and bodies would differ.
+constraints are soft: equalities are as hard as it permits. Elements along sums of coordinates and along paths are
+tendons. What the format cannot express is listed in a `ModelWarning` with the reason, or refused where joints and
+bodies would differ.
 """
 
 from __future__ import annotations
@@ -19,14 +20,19 @@ from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
+from ..forces.motor import Motor
+from ..forces.path_spring import PathSpring
+from ..forces.rope import Rope
 from ..forces.rotor_inertia import RotorInertia
-from ..joints.coupler import Coupler
+from ..forces.spring_damper import SpringDamper
+from ..forces.torsional_spring import TorsionalSpringDamper
 from ..joints.fixed import Fixed
 from ..joints.revolute import Revolute
 from ..joints.spherical import Spherical
-from ..model.body import GROUND, Body
+from ..model.body import GROUND, Body, frame_of
 from ..model.element import Element
-from ..model.geometry import matrix_to_quaternion, orientation_matrix, vector
+from ..model.force import CoordinateForce, Force
+from ..model.geometry import matrix_to_quaternion
 from ..model.inertia import checked_shapes, mass_properties
 from ..model.joint import Joint
 from ..model.model import Model
@@ -35,11 +41,13 @@ from ..model.shapes.box import Box
 from ..model.shapes.capsule import Capsule
 from ..model.shapes.cylinder import Cylinder
 from ..model.shapes.ellipsoid import Ellipsoid
+from ..model.shapes.plane import Plane
+from ..model.shapes.rod import Rod
 from ..model.shapes.sphere import Sphere
 from ..tables.element_numbers import element_numbers
 from ..tables.forest import coordinate_row, joint_bodies
 from ..tables.structure import Choices, structure
-from ..tables.structure_definition import velocity_names
+from ..tables.structure_definition import FrameSpec, velocity_names
 from ..tables.table_definitions import FREE, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL
 from ..tables.values import values
 
@@ -48,7 +56,7 @@ CLOSED_BY_EQUALITIES = (Spherical, Fixed, Revolute)
 HARDEST = {"solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Impedance of equalities: the largest of MuJoCo (mjMAXIMP)."""
 UNLIMITED = 1e9
-"""Bound of a joint with one stop, for MJCF limits joints on both sides [rad or m]."""
+"""Bound of a joint or tendon with one stop, for MJCF limits them on both sides [rad or m]."""
 SMALLEST_INERTIA = 1e-15
 """Mass and moments of inertia that MuJoCo demands of bodies that move (mjMINVAL)."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -56,6 +64,20 @@ CONTROL = re.compile(
     rf"(?:(?P<gear>{NUMBER})\*(?P<open>\())?(?:(?P<gain>{NUMBER})\*)?(?P<control>[A-Za-z_]\w*)(?(open)\))"
 )
 """Laws of actuators that have a counterpart: a parameter, or gear*(gain*parameter), as the reader writes them."""
+PARAMETER_LAWS = "its law is not a multiple of a parameter"
+SPRINGS = (CoordinateSpring, TorsionalSpringDamper, SpringDamper, PathSpring)
+GEOMS: dict[type, str] = {Box: "box", Sphere: "sphere", Capsule: "capsule", Cylinder: "cylinder", Rod: "cylinder",
+                          Ellipsoid: "ellipsoid", Plane: "plane"}  # fmt: skip
+"""Shapes with a geom of their own; others are written as meshes."""
+REASONS = {
+    **dict.fromkeys(("materials", "material_pairs", "contacts", "bulk"), "contact is not written"),
+    **dict.fromkeys(("tables", "controllers"), "the file has no laws"),
+    "sensors": "the file describes the motion only",
+    "events": "the file has no events",
+    "drivers": "the format prescribes no motion",
+    "initial": "the file starts at the reference configuration",
+}
+"""Why elements of a category are left out."""
 
 
 def save_mjcf(model: Model, path: Path) -> None:
@@ -83,20 +105,31 @@ class _Writer:
         self.numbers, self.env, self.poses = given.of, given.env, self.values.poses
         self.written: set[str] = set(self.tree)
         self.missing: list[str] = []
+        self.reasons: dict[str, str] = {}  # by element
+        self.tags: dict[str, ET.Element] = {}  # by body
         self.root = ET.Element("mujoco", model=model.name)
         ET.SubElement(self.root, "compiler", angle="radian", autolimits="true")
         ET.SubElement(self.root, "option", gravity=_row(self.values.system.gravity))
         self.places = self._drawn_joints()
         self.joint_tags: dict[int, ET.Element] = {}  # by row
+        self.assets, self.tendons, self.equalities, self.actuators = (
+            ET.Element(x) for x in ("asset", "tendon", "equality", "actuator")
+        )
+        self.controls: list[float] = []
 
     def text(self) -> str:
         """The file."""
-        self._bodies(ET.SubElement(self.root, "worldbody"))
-        self._along_coordinates()
-        self._equalities(ET.SubElement(self.root, "equality"))
-        self._actuators(ET.SubElement(self.root, "actuator"))
-        for tag in [x for x in self.root if x.tag in ("equality", "actuator") and not len(x)]:
-            self.root.remove(tag)
+        world = ET.Element("worldbody")
+        self._bodies(world)
+        self._closed_loops()
+        for c in self.model.couplings:
+            self._coupling(c)
+        for e in (*self.model.limits, *self.model.forces):
+            self._force(e)
+        parts = (self.assets, world, self.tendons, self.equalities, self.actuators)
+        self.root.extend(x for x in parts if len(x) or x is world)
+        if any(self.controls):  # MuJoCo's controls are zero but for keyframes
+            ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="as described", ctrl=_row(self.controls))
         self._report()
         ET.indent(self.root)
         return '<?xml version="1.0"?>\n' + ET.tostring(self.root, encoding="unicode") + "\n"
@@ -123,16 +156,18 @@ class _Writer:
         names = {row: name for name, row in self.s.place.items()}
         children = np.bincount(tree.parent[tree.parent >= 0], minlength=len(tree.parent))
         tags: dict[int, tuple[ET.Element, str, list[int]]] = {-1: (world, GROUND, [])}  # with waiting joints
+        self.tags[GROUND] = world
         self._carried(world, GROUND)
         for b, parent in enumerate(tree.parent.tolist()):
             above, carrier, waiting = tags[parent]
             joints = [*waiting, b]
             if b not in names or (children[b] == 1 and self._is_link(names[b])):
                 tags[b] = above, carrier, joints
+                self.written.add(names.get(b, ""))
                 continue
             name = names[b]
             T = np.linalg.inv(self._pose(carrier)) @ self._pose(name)
-            tag = ET.SubElement(above, "body", {"name": name} | _placed(T))
+            tag = self.tags[name] = ET.SubElement(above, "body", {"name": name} | _placed(T))
             for row in joints:
                 self._joint(tag, name, row)
             self._inertial(tag, name, any(tree.nv[row] for row in joints) or len(joints) > 1)
@@ -140,10 +175,11 @@ class _Writer:
             tags[b] = tag, name, []
 
     def _is_link(self, name: str) -> bool:
-        """Whether a body only connects joints: it has neither mass nor shape nor frame, and closes no loop."""
+        """Whether a body only connects joints: it has no mass, shape, frame or end of a force, and closes no loop."""
         body: Body = self.model[name]
         used = {end for j in self.cut for end in joint_bodies(self.model, self.model[j])}
         used |= {e.body for e in self.model.frames}
+        used |= {self.model.carrier(x, e) for e in self.model.forces for x in e.ends().values()}
         return self.values.system.bodies.mass[self.s.place[name]] == 0.0 and not body.shapes() and name not in used
 
     def _pose(self, name: str) -> np.ndarray:
@@ -206,25 +242,33 @@ class _Writer:
         """Shapes and frames of a body, or of ground."""
         bodies: list[Any] = [self.model[name]] if name != GROUND else self.model.ground
         for e in bodies:
-            place, n = np.eye(4), self.numbers[e.name]
-            if name == GROUND and not self.model.planar:
-                place[:3, 3] = vector(n.position, False, e.title)
-                place[:3, :3] = orientation_matrix(n.orientation, e.title)
+            place = np.eye(4)
+            if name == GROUND:
+                place[:3, 3], place[:3, :3] = frame_of(e, self.numbers[e.name])
             self.written.add(e.name)
             for s, numbers, title in checked_shapes(e, self.env, self.model.planar):
-                size = None if self.model.planar else _size(s, numbers)
-                if size is None:
-                    self.missing.append(title.rstrip(": ") + f" ({type(s).__name__})")
-                    continue
-                T = np.eye(4)
-                T[:3, 3], T[:3, :3] = s.pose(numbers)
-                kind = {"type": type(s).__name__.lower(), "size": _row(size), "contype": "0", "conaffinity": "0"}
-                ET.SubElement(tag, "geom", kind | {"mass": "0"} | _placed(place @ T))
+                if not s.hole:  # holes are not drawn, and their mass is that of the body
+                    self._geom(tag, place, s, numbers, title)
         for f in self.model.frames:
             if f.body == name:
                 self.written.add(f.name)
                 T = np.linalg.inv(self._pose(name)) @ self._pose(f.name)
                 ET.SubElement(tag, "site", {"name": f.name} | _placed(T))
+
+    def _geom(self, tag: ET.Element, place: np.ndarray, s: Any, n: Any, title: str) -> None:
+        """A shape, for display; one without a geom of its own as a mesh."""
+        T, given = np.eye(4), {"type": GEOMS.get(type(s), "mesh")}
+        T[:3, 3], T[:3, :3] = s.pose(n)
+        if type(s) in GEOMS:
+            given["size"] = _row(_size(s, n))
+        else:
+            v, f = s.surface(n)
+            name = f"mesh{len(self.assets)}"
+            faces = " ".join(map(str, np.ravel(f).tolist()))
+            # MuJoCo demands a closed surface unless the inertia is that of a shell; it is not used
+            ET.SubElement(self.assets, "mesh", name=name, vertex=_row(np.ravel(v)), face=faces, inertia="shell")
+            given["mesh"] = name
+        ET.SubElement(tag, "geom", given | {"contype": "0", "conaffinity": "0", "mass": "0"} | _placed(place @ T))
 
     def _row_of(self, text: str) -> int | None:
         """Row of the joint that has a coordinate, written ``joint.coordinate``."""
@@ -232,30 +276,63 @@ class _Writer:
         row = coordinate_row(self.s, joint, what)
         return row if row in self.joint_tags else None
 
-    def _along_coordinates(self) -> None:
-        """Stops, springs, damping and friction of joints; the first of each kind that a joint has."""
-        for e in (*self.model.limits, *self.model.forces):
-            row = self._row_of(getattr(e, "coordinate", ""))
-            given = self._of_joint(e, self.numbers[e.name]) if row is not None else {}
-            if row is not None and given and not set(given) & set(self.joint_tags[row].attrib):
-                self.joint_tags[row].attrib.update(given)
-                self.written.add(e.name)
+    def _force(self, e: Force) -> None:
+        """A stop, spring, damper, friction or motor, on a joint or a tendon; else note why not."""
+        n = self.numbers[e.name]
+        control = control_of(self.model, e)
+        given = {} if control else attributes_of(e, n, self.poses.frame_separation(e))
+        if isinstance(given, str):
+            self.reasons[e.name] = given
+            return
+        row = self._row_of(e.coordinate_text()) if isinstance(e, CoordinateForce) else None
+        tag = None if row is None else self.joint_tags[row]
+        lower, upper = given.pop("rest", (0.0, 0.0))
+        named = {k: _row(x) for k, x in given.items()}
+        if tag is not None and lower == upper and not set(given) & set(tag.attrib):
+            tag.attrib.update(named | ({"springref": _row([lower])} if "stiffness" in given else {}))
+        else:
+            tag = self._tendon(e, n)
+            if tag is None:
+                return
+            tag.attrib.update(named | ({"springlength": _row([lower, upper])} if "stiffness" in given else {}))
+        self.written.add(e.name)
+        if getattr(n, "restitution", None):
+            self.missing.append(f"the restitution of {e.title} (stops are soft in MuJoCo)")
+        if control:
+            gear, parameter = control
+            # MuJoCo's force lengthens a tendon, a tension shortens it
+            gear = -gear if isinstance(e, SpringDamper | PathSpring) else gear
+            on = "joint" if tag.tag == "joint" else "tendon"
+            ET.SubElement(self.actuators, "motor", {"name": e.name, on: tag.attrib["name"], "gear": repr(gear)})
+            self.controls.append(float(self.values.env[parameter]))
 
-    def _of_joint(self, e: Element, n: Any) -> dict[str, str]:
-        """Attributes of a joint that an element becomes; none if there are none for it."""
-        if isinstance(e, Limit) and e.stiffness is None:
-            lower, upper = (b if x is None else float(x) for x, b in ((n.lower, -UNLIMITED), (n.upper, UNLIMITED)))
-            return {"range": _row((lower, upper))}
-        if isinstance(e, CoordinateSpring) and e.force is None:
-            spring = {"stiffness": repr(float(n.stiffness)), "springref": repr(float(n.rest))} if n.stiffness else {}
-            return spring | ({"damping": repr(float(n.damping))} if n.damping else {})
-        if isinstance(e, Brake) and isinstance(n.capacity, int | float) and n.static == 1.0:
-            return {"frictionloss": repr(float(n.capacity))}
-        if isinstance(e, RotorInertia):
-            return {"armature": repr(float(e.added_inertia(n)))}
-        return {}
+    def _tendon(self, e: Force, n: Any) -> ET.Element | None:
+        """A new tendon along the coordinates or the path of an element; None, with the reason, if there is none."""
+        if isinstance(e, CoordinateForce) and e.along():
+            return self._fixed_tendon(e, e.along(), e.switch_weights(n, "") or (1.0,))
+        found = ET.SubElement(self.tendons, "spatial", name=e.name)
+        for k, role in enumerate(e.ends()):
+            p, R, carrier = self.poses.world(FrameSpec(0, e, role))
+            place = np.eye(4)
+            place[:3, 3], place[:3, :3] = np.real(p), np.real(R)
+            site = f"{e.name}_{k}"
+            T = np.linalg.inv(self._pose(carrier)) @ place
+            ET.SubElement(self.tags[carrier], "site", {"name": site} | _placed(T))
+            ET.SubElement(found, "site", site=site)
+        return found
 
-    def _equalities(self, tag: ET.Element) -> None:
+    def _fixed_tendon(self, e: Element, along: tuple[str, ...], weights: Any) -> ET.Element | None:
+        """A new tendon along a weighted sum of coordinates."""
+        rows = [self._row_of(text) for text in along]
+        if None in rows:
+            self.reasons[e.name] = f"{along[rows.index(None)]} is not the coordinate of a hinge or slide"
+            return None
+        found = ET.SubElement(self.tendons, "fixed", name=e.name)
+        for row, w in zip(rows, weights, strict=True):
+            ET.SubElement(found, "joint", joint=self.joint_tags[row].attrib["name"], coef=_row([w]))  # type: ignore[index]
+        return found
+
+    def _closed_loops(self) -> None:
         for name in self.cut:
             e: Joint = self.model[name]
             self.written.add(name)
@@ -264,7 +341,7 @@ class _Writer:
                 first, second = second, first
             ends = {"body1": first} | ({"body2": second} if second != GROUND else {}) | HARDEST
             if isinstance(e, Fixed):
-                ET.SubElement(tag, "weld", {"name": name} | ends)
+                ET.SubElement(self.equalities, "weld", {"name": name} | ends)
                 continue
             (p, R), _ = self.poses.ends(e)
             points = [p]
@@ -273,38 +350,31 @@ class _Writer:
             for k, x in enumerate(points):
                 anchor = (np.linalg.inv(self._pose(first)) @ [*x, 1.0])[:3]
                 called = name if k == 0 else f"{name}_axis"
-                ET.SubElement(tag, "connect", {"name": called, "anchor": _row(anchor)} | ends)
-        for c in self.model.couplings:
-            self._coupling(tag, c)
+                ET.SubElement(self.equalities, "connect", {"name": called, "anchor": _row(anchor)} | ends)
 
-    def _coupling(self, tag: ET.Element, c: Any) -> None:
-        """A linear relation of two coordinates: y - y0 = c0 + c1 (x - x0)."""
-        at = [self._row_of(text) for text in c.coordinates] if isinstance(c, Coupler) else []
-        if len(at) != 2 or None in at:
-            raise ModelError(f"{c.title} has no counterpart in MJCF, which couples two coordinates of joints")
+    def _coupling(self, c: Any) -> None:
+        """A linear relation of coordinates: of two y - y0 = c0 + c1 (x - x0), of more a tendon of constant length."""
+        at = [row for text in c.coupled() if (row := self._row_of(text)) is not None]
+        if len(at) < len(c.coupled()):
+            other = next(text for text in c.coupled() if self._row_of(text) is None)
+            raise ModelError(f"{c.title} has no counterpart in MJCF: {other} is not the coordinate of a hinge or slide")
         n, offset = self.numbers[c.name], self.values.system.bodies.offset
-        (a, b), (y, x) = (float(w) for w in n.weights), (float(offset[row]) for row in at)
-        c0 = 0.0 if n.value is None else float(n.value) / a - b / a * x - y
-        names = {f"joint{k}": self.joint_tags[row].attrib["name"] for k, row in enumerate(at, 1)}  # type: ignore[index]
-        ET.SubElement(tag, "joint", {"name": c.name, "polycoef": _row((c0, -b / a, 0, 0, 0))} | names | HARDEST)
+        factors = np.array(c.factors(n, self.model, self.poses.axis), float)
+        factors /= factors[0]
+        total = c.total(n)
+        c0 = 0.0 if total is None else float(total) / c.first_weight(n) - float(factors @ offset[at])
+        names = {f"joint{k}": self.joint_tags[row].attrib["name"] for k, row in enumerate(at, 1)}
+        if len(at) == 2:
+            given = {"name": c.name, "polycoef": _row((c0, -factors[1], 0, 0, 0))} | names
+            ET.SubElement(self.equalities, "joint", given | HARDEST)
+        else:
+            self._fixed_tendon(c, c.coupled(), factors)
+            given = {"name": c.name, "tendon1": c.name, "polycoef": _row((c0, 0, 0, 0, 0))}
+            ET.SubElement(self.equalities, "tendon", given | HARDEST)
         self.written.add(c.name)
 
-    def _actuators(self, tag: ET.Element) -> None:
-        controls: list[float] = []
-        for e in self.model.forces:
-            row = self._row_of(getattr(e, "coordinate", "")) if type(e) is Actuator else None
-            law = CONTROL.fullmatch(e.force.replace(" ", "")) if row is not None and isinstance(e.force, str) else None  # type: ignore[attr-defined]
-            if row is None or law is None or law["control"] not in self.model.parameters:
-                continue
-            gear = float(law["gear"] or 1.0) * float(law["gain"] or 1.0)
-            ET.SubElement(tag, "motor", name=e.name, joint=self.joint_tags[row].attrib["name"], gear=repr(gear))
-            controls.append(float(self.values.env[law["control"]]))
-            self.written.add(e.name)
-        if any(controls):  # MuJoCo's controls are zero but for keyframes
-            ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="as described", ctrl=_row(controls))
-
     def _report(self) -> None:
-        rest = [e.title for e in self.model.elements() if e.name not in self.written]
+        rest = left_out(self.model, self.written, self.reasons)
         if rest or self.missing:
             listed = ", ".join([*rest, *self.missing])
             warn_user(f"MJCF has no counterpart of {listed}; the file lacks them", ModelWarning)
@@ -320,7 +390,7 @@ def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
         return name
 
     texts = [text for c in model.couplings for text in c.coupled()]
-    texts += [getattr(e, "coordinate", "") for e in (*model.forces, *model.limits)]
+    texts += [text for e in (*model.forces, *model.limits) if isinstance(e, CoordinateForce) for text in e.along()]
     used = {text.partition(".")[0] for text in texts}
     tree, cut = set(), []
     for j in sorted(model.joints, key=lambda x: isinstance(x, CLOSED_BY_EQUALITIES) * (1 + (x.name not in used))):
@@ -338,17 +408,61 @@ def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
     return [j.name for j in model.joints if j.name in tree], cut
 
 
-def _size(s: Any, n: Any) -> tuple[float, ...] | None:
-    """Sizes of a shape as a geom; None if it has no counterpart."""
+def left_out(model: Model, written: set[str], reasons: dict[str, str]) -> list[str]:
+    """Title and reason of each element that was not written."""
+    rest = [e for e in model.elements() if e.name not in written]
+    return [f"{e.title} ({reasons.get(e.name) or REASONS[e.category]})" for e in rest]
+
+
+def control_of(model: Model, e: Element) -> tuple[float, str] | None:
+    """Factor and parameter of an element that is a motor; None of any other."""
+    if not isinstance(e, Actuator | Motor | CoordinateSpring | SpringDamper | PathSpring):
+        return None
+    law = e.laws()[0]
+    found = CONTROL.fullmatch(law.replace(" ", "")) if isinstance(law, str) else None
+    only = getattr(e, "stiffness", 0.0) == 0.0 == getattr(e, "damping", 0.0)
+    if found is None or not only or found["control"] not in model.parameters:
+        return None
+    return float(found["gear"] or 1.0) * float(found["gain"] or 1.0), found["control"]
+
+
+def attributes_of(e: Element, n: Any, separation: float) -> dict[str, Any] | str:
+    """Attributes of a joint or tendon that an element becomes, ``rest`` being the range without force; or why none."""
+    if isinstance(e, Limit | Rope):
+        bounds = (0.0, separation if n.length is None else n.length) if isinstance(e, Rope) else (n.lower, n.upper)
+        lower, upper = (b if x is None else float(x) for x, b in zip(bounds, (-UNLIMITED, UNLIMITED), strict=True))
+        if e.stiffness is None:
+            return {"range": (lower, upper)}
+        if n.damping:
+            return "its damping acts only where its spring does"
+        return {"stiffness": [n.stiffness], "rest": (lower, upper)}
+    if isinstance(e, Brake):
+        if not isinstance(n.capacity, int | float) or n.static != 1.0:
+            return "friction is a number in MJCF, the same at rest"
+        return {"frictionloss": [n.capacity]}
+    if isinstance(e, RotorInertia):
+        return {"armature": [e.added_inertia(n)]}
+    if isinstance(e, Actuator | Motor) or (isinstance(e, SPRINGS) and e.laws()[0] is not None):
+        return PARAMETER_LAWS
+    if not isinstance(e, SPRINGS):
+        return f"MJCF has no {type(e).__name__}"
+    rest = next((getattr(n, k) for k in ("rest", "angle", "length") if hasattr(n, k)), None)
+    rest = separation if rest is None else float(rest)
+    spring = {"stiffness": [n.stiffness], "rest": (rest, rest)} if n.stiffness else {}
+    return spring | ({"damping": [n.damping]} if n.damping else {})
+
+
+def _size(s: Any, n: Any) -> tuple[float, ...]:
+    """Sizes of a shape as a geom of its own."""
+    if isinstance(s, Plane):  # half edges, and the spacing of its grid
+        half = float(s.size(n)[0]) / 2
+        return half, half, half / 10
     if isinstance(s, Box):
         return tuple(float(x) / 2 for x in n.edges)
-    if isinstance(s, Sphere):
-        return (float(n.radius),)
-    if isinstance(s, Capsule | Cylinder):
-        return float(n.radius), float(n.length) / 2
     if isinstance(s, Ellipsoid):
         return tuple(float(x) for x in n.semi_axes)
-    return None
+    radius, *length = s.size(n)[:2]
+    return float(radius), *(float(x) / 2 for x in length)
 
 
 def _row(x: Any) -> str:

@@ -13,14 +13,13 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
-from xml.parsers import expat
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
-from ..forces.coordinate_spring import CoordinateSpring
+from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
 from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
@@ -28,14 +27,10 @@ from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
 from ..model.body import GROUND, Body, Frame, Ground, Initial
-from ..model.element import Element, resolve
+from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
-from ..model.shapes.box import Box
-from ..model.shapes.cylinder import Cylinder
-from ..model.shapes.mesh import MESH_FORMATS, Mesh
-from ..model.shapes.solid import Solid
-from ..model.shapes.sphere import Sphere
+from .robot_file import RobotFile, line_of, rows
 
 T = TypeVar("T", bound=Model)
 
@@ -48,7 +43,7 @@ COORDINATES = {"revolute": "angle", "continuous": "angle", "prismatic": "displac
 """Coordinate of each type of joint that has one."""
 JOINT_TYPES = (*COORDINATES, "fixed", "floating", "planar")
 UNDERSTOOD = {
-    "robot": {"name", "link", "joint", "material", "version"},
+    "robot": {"name", "link", "joint", "transmission", "material", "version"},
     "link": {"name", "inertial", "visual", "collision"},
     "inertial": {"origin", "mass", "inertia"},
     "mass": {"value"},
@@ -72,12 +67,9 @@ UNDERSTOOD = {
     "mimic": {"joint", "multiplier", "offset"},
 }
 """Tags, with the attributes and tags in them that are used."""
-
-
-class _Element(ET.Element):
-    """An element of XML that knows its line."""
-
-    line = 0
+IN_TRANSMISSIONS = {"transmission", "type", "joint", "actuator", "mechanicalReduction", "offset"}
+"""Tags of a transmission that are used; the offset moves the actuator's zero only, and no force depends on it."""
+SIMPLE = "SimpleTransmission"
 
 
 @dataclass
@@ -117,100 +109,18 @@ def load_urdf(path: Path, make: Callable[..., T], floating: bool = False) -> T:
     return _Reader(path).mechanism(make, floating)
 
 
-class _Reader:
+class _Reader(RobotFile):
     """One file being read."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.robot = self._parsed()
+        super().__init__(path)
         self.links = self._named("link")
         self.joints = [self._joint(tag) for tag in self._named("joint").values()]
         self._fix_at_equal_limits()
         self.names: dict[str, str] = {}
         self.unused: dict[str, list[int]] = {}
-        self.missing: list[str] = []
         self.raised: list[str] = []
         self.renamed: list[str] = []
-
-    def fail(self, tag: ET.Element | None, what: str) -> NoReturn:
-        """Raise an error that names the file and the line."""
-        where = f", line {line_of(tag)}" if tag is not None else ""
-        raise ModelError(f"{self.path}{where}: {what}")
-
-    def _parsed(self) -> ET.Element:
-        try:
-            data = self.path.read_bytes()
-        except OSError as error:
-            raise ModelError(f"{self.path} cannot be read: {error.strerror}") from None
-        builder, parser = ET.TreeBuilder(element_factory=_Element), expat.ParserCreate()
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            builder.start(tag, attributes).line = parser.CurrentLineNumber  # type: ignore[attr-defined]
-
-        parser.StartElementHandler, parser.EndElementHandler = start, builder.end
-        try:
-            parser.Parse(data, True)
-        except expat.ExpatError as error:
-            raise ModelError(f"{self.path} is no XML: {error}") from None
-        root = builder.close()
-        if root.tag != "robot":
-            self.fail(root, f"<{root.tag}> is not URDF, whose first tag is <robot>")
-        return root
-
-    def _named(self, tag: str) -> dict[str, ET.Element]:
-        found: dict[str, ET.Element] = {}
-        for x in self.robot.findall(tag):
-            name = self.attribute(x, "name")
-            if name in found:
-                self.fail(x, f"there are two {tag}s {name!r}")
-            found[name] = x
-        return found
-
-    def attribute(self, tag: ET.Element, name: str) -> str:
-        """An attribute that must be there."""
-        if name not in tag.attrib:
-            self.fail(tag, f"<{tag.tag}> needs the attribute {name!r}")
-        return tag.attrib[name]
-
-    def numbers(self, tag: ET.Element | None, name: str, default: str | None, n: int = 3) -> np.ndarray:
-        """Numbers of an attribute; without a default it must be there."""
-        text = default
-        if tag is not None and (default is None or name in tag.attrib):
-            text = self.attribute(tag, name)
-        assert text is not None
-        try:
-            out = np.array([float(x) for x in text.split()])
-        except ValueError:
-            out = np.zeros(0)
-        if len(out) != n or not np.isfinite(out).all():
-            needed = "a finite number is" if n == 1 else f"{n} finite numbers are"
-            self.fail(tag, f"{name}={text!r} of <{getattr(tag, 'tag', '')}>: {needed} needed")
-        return out
-
-    def number(self, tag: ET.Element | None, name: str, default: str | None = None) -> float:
-        """The number of an attribute."""
-        return float(self.numbers(tag, name, default, 1)[0])
-
-    def child(self, tag: ET.Element, name: str) -> ET.Element:
-        """A tag in another that must be there."""
-        found = tag.find(name)
-        if found is None:
-            self.fail(tag, f"<{tag.tag}> {tag.get('name', '')!r} needs <{name}>")
-        return found
-
-    def origin(self, tag: ET.Element) -> np.ndarray:
-        """Pose of an <origin>, (4, 4): roll, pitch and yaw are rotations about fixed axes x, y, z."""
-        place = tag.find("origin")
-        out = np.eye(4)
-        out[:3, 3] = self.numbers(place, "xyz", "0 0 0")
-        (r, p, y) = self.numbers(place, "rpy", "0 0 0")
-        cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
-        out[:3, :3] = [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-        return out
 
     def _joint(self, tag: ET.Element) -> _Joint:
         name, kind = self.attribute(tag, "name"), self.attribute(tag, "type")
@@ -223,7 +133,8 @@ class _Reader:
         axis = self.numbers(tag.find("axis"), "xyz", "1 0 0")
         if kind not in ("fixed", "floating") and not axis.any():
             self.fail(tag, f"the axis of joint {name!r} is zero")
-        return _Joint(name, kind, ends[0], ends[1], self.origin(tag), axis, tag)
+        axis = axis / (np.abs(axis).max() or 1.0)  # its square must be finite
+        return _Joint(name, kind, ends[0], ends[1], self.origin(tag), axis / (np.linalg.norm(axis) or 1.0), tag)
 
     def _fix_at_equal_limits(self) -> None:
         """Joints whose limits are equal do not move: they are fixed at that value."""
@@ -232,13 +143,13 @@ class _Reader:
             if j.kind in ("revolute", "prismatic") and limit is not None:
                 value = self.number(limit, "lower", "0")
                 if value == self.number(limit, "upper", "0"):
-                    axis, shift = j.axis / np.linalg.norm(j.axis), np.eye(4)
+                    shift = np.eye(4)
                     if j.kind == "revolute":
                         shift[:3, :3] = quaternion_to_matrix(
-                            np.array([math.cos(value / 2), *(math.sin(value / 2) * axis)])
+                            np.array([math.cos(value / 2), *(math.sin(value / 2) * j.axis)])
                         )
                     else:
-                        shift[:3, 3] = value * axis
+                        shift[:3, 3] = value * j.axis
                     j.origin, j.kind = j.origin @ shift, "fixed"
 
     def root(self) -> str:
@@ -286,6 +197,10 @@ class _Reader:
                 moving += self._limits_and_losses(j)
             waiting += below[j.child][::-1]
         m.add(*moving, *self._mimics())
+        parameters: dict[str, float] = {}
+        motors = list(self._motors(parameters))
+        m.parameters.update(parameters)
+        m.add(*motors)
         self._report()
         return m
 
@@ -305,7 +220,7 @@ class _Reader:
         """Add a link as a body, or as a frame on ``rigid`` where it is rigidly connected and has no mass."""
         tag, T = self.links[link], self.place[link]
         inertial = tag.find("inertial")
-        shapes = tuple(self._shapes(tag))
+        shapes = tuple(self.shapes(tag))
         name = self.name(link)
         mass = self._mass(link)
         if mass < 0.0:
@@ -314,7 +229,7 @@ class _Reader:
         if rigid == GROUND and (mass == 0.0 or link == self.root()):
             m.add(Frame(name, GROUND, **pose))
             if shapes:
-                m.add(Ground(self.name(f"{link}_shape"), shape=shapes, **pose))
+                m.add(Ground(self.name(f"{link}_shape"), shape=shapes, **pose, color=self.color(tag, shapes)))
             self.carrier[link] = GROUND
             return
         if mass == 0.0 and rigid is not None and not shapes:
@@ -335,7 +250,7 @@ class _Reader:
             tensor = self._physical(link, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
             given = {"mass": mass, "com": tuple(own[:3, 3]), "inertia": tensor, "inertia_axes": rows(own[:3, :3])}
         try:
-            m.add(Body(name, **given, **pose, shape=shapes or None, color=self._color(tag)))
+            m.add(Body(name, **given, **pose, shape=shapes or None, color=self.color(tag, shapes)))
         except ModelError as error:
             self.fail(inertial if inertial is not None else tag, str(error))
         self.carrier[link] = name
@@ -357,12 +272,18 @@ class _Reader:
 
     def _carries_mass(self, link: str, below: dict[str, list[_Joint]]) -> bool:
         """Whether a link beyond this one has mass."""
-        return any(self._mass(j.child) > 0.0 or self._carries_mass(j.child, below) for j in below[link])
+        beyond = [j.child for j in below[link]]
+        while beyond:
+            name = beyond.pop()
+            if self._mass(name) > 0.0:
+                return True
+            beyond += [j.child for j in below[name]]
+        return False
 
     def _connection(self, j: _Joint) -> Iterator[Element]:
         T = self.place[j.child]
         ends = self.carrier[j.parent], self.carrier[j.child]
-        at, axis = tuple(T[:3, 3]), tuple(T[:3, :3] @ (j.axis / (np.linalg.norm(j.axis) or 1.0)))
+        at, axis = tuple(T[:3, 3]), tuple(T[:3, :3] @ j.axis)
         name = self.name(j.name)
         self.names[j.name] = name
         if j.kind == "fixed":
@@ -420,77 +341,87 @@ class _Reader:
             if kinds[other] not in COORDINATES or j.kind not in COORDINATES:
                 self.fail(tag, f"joint {j.name!r} cannot follow {other!r}: both must be joints with one coordinate")
             factor, offset = self.number(tag, "multiplier", "1"), self.number(tag, "offset", "0")
+            if factor == 0.0:
+                self.fail(tag, f"the multiplier of joint {j.name!r} is 0, so that it follows nothing; make it fixed")
+            self._refuse_circles(j)
             ends = [f"{self.names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
             yield Coupler(self.name(f"{self.names[j.name]}_mimic"), tuple(ends), weights=(1.0, -factor), value=offset)
 
-    def _shapes(self, link: ET.Element) -> list[Solid]:
-        """Visible shapes of a link, those for collision where there are no others that can be read."""
-        found = list(self._solids(link.findall("visual")))
-        return found or list(self._solids(link.findall("collision")))
+    def _refuse_circles(self, j: _Joint) -> None:
+        """Refuse a joint that follows itself, through others perhaps."""
+        leader = {x.name: x.tag.find("mimic") for x in self.joints}
+        name = j.name
+        for _ in self.joints:
+            tag = leader.get(name)
+            if tag is None:
+                return
+            name = tag.get("joint", "")
+            if name == j.name:
+                self.fail(j.tag, f"joint {j.name!r} follows itself")
 
-    def _solids(self, tags: list[ET.Element]) -> Iterator[Solid]:
-        for tag in tags:
-            T = self.origin(tag)
-            geometry = self.child(tag, "geometry")
-            given: dict[str, Any] = {"position": tuple(T[:3, 3]), "orientation": rows(T[:3, :3]), "looks": True}
-            for x in geometry:
-                try:
-                    if (solid := self._solid(x, given)) is not None:
-                        solid.check(resolve(solid, {}))
-                        yield solid
-                except ModelError as error:
-                    self.missing.append(f"<{x.tag}> in line {line_of(x)}: {error}")
+    def _motors(self, parameters: dict[str, float]) -> Iterator[Element]:
+        """Actuators of simple transmissions: reduction times control, with the control as a parameter."""
+        kinds = {j.name: j.kind for j in self.joints}
+        driven: dict[str, str] = {}
+        for tag in self.robot.findall("transmission"):
+            kind = (tag.get("type") or tag.findtext("type") or "").strip().rpartition("/")[2]
+            if kind != SIMPLE:
+                why = f"transmission of type {kind or 'unknown'}, which is not {SIMPLE}"
+                self.unused.setdefault(why, []).append(line_of(tag))
+                continue
+            name = self.attribute(tag, "name")
+            joint, actuator = self._only(tag, "joint"), self._only(tag, "actuator")
+            moved = self.attribute(joint, "name")
+            if moved not in kinds:
+                self.fail(joint, f"transmission {name!r} drives the joint {moved!r}, which does not exist")
+            if moved in driven:
+                self.fail(
+                    joint, f"transmissions {driven[moved]!r} and {name!r} drive one joint, {moved!r}; leave one out"
+                )
+            driven[moved] = name
+            reduction = self._reduction(tag)
+            if kinds[moved] not in COORDINATES:
+                why = f"transmission of a {kinds[moved]} joint"
+                self.unused.setdefault(why, []).append(line_of(tag))
+                continue
+            given = self.attribute(actuator, "name")
+            called, control = self.name(given), self.name(re.sub(r"\W", "_", f"control_{given}"))
+            parameters[control] = 0.0
+            along = f"{self.names[moved]}.{COORDINATES[kinds[moved]]}"
+            yield Actuator(called, along, force=f"{reduction!r}*{control}")
 
-    def _solid(self, x: ET.Element, given: dict[str, Any]) -> Solid | None:
-        if x.tag == "box":
-            return Box(edges=tuple(self.numbers(x, "size", None)), **given)
-        if x.tag == "sphere":
-            return Sphere(radius=self.number(x, "radius"), **given)
-        if x.tag == "cylinder":
-            return Cylinder(radius=self.number(x, "radius"), length=self.number(x, "length"), **given)
-        if x.tag != "mesh" or (file := self._mesh_file(x)) is None:
-            return None
-        scale = self.numbers(x, "scale", "1 1 1")
-        if np.ptp(scale) != 0.0 or scale[0] <= 0.0:
-            self.missing.append(f"{file.name} (scaled by {scale})")
-            return None
-        return Mesh(path=str(file), scale=float(scale[0]), **given)
+    def _only(self, transmission: ET.Element, role: str) -> ET.Element:
+        """The one joint or actuator of a simple transmission."""
+        found = transmission.findall(role)
+        if len(found) != 1:
+            name = transmission.get("name")
+            self.fail(transmission, f"transmission {name!r} has {len(found)} <{role}>; a {SIMPLE} has one")
+        return found[0]
 
-    def _mesh_file(self, tag: ET.Element) -> Path | None:
-        """The file of a mesh: ``package://name/path`` is looked for in the folders above the model."""
-        text = self.attribute(tag, "filename")
-        inside = re.sub(r"^(package|model|file)://", "", text)
-        folders = [self.path.parent, *self.path.absolute().parents]
-        tries = [folder / part for folder in folders for part in (inside, inside.partition("/")[2])]
-        found = next((x for x in tries if x.is_file()), None)
-        if found is None or found.suffix.lower() not in MESH_FORMATS:
-            self.missing.append(f"{text} in line {line_of(tag)}")
-            return None
-        return found
-
-    def _color(self, link: ET.Element) -> str | None:
-        """Colour of the first visible shape, also by the name of a material of the robot."""
-        material = link.find("visual/material")
-        if material is None:
-            return None
-        color = material.find("color")
-        if color is None:
-            same = [x for x in self.robot.findall("material") if x.get("name") == material.get("name")]
-            color = same[0].find("color") if same else None
-        if color is None:
-            return None
-        rgba = np.clip(self.numbers(color, "rgba", None, 4), 0.0, 1.0)
-        return "#" + "".join(f"{round(255 * x):02x}" for x in rgba[:3])
+    def _reduction(self, transmission: ET.Element) -> float:
+        """Speed of the actuator relative to that of the joint; 1 if not given."""
+        found = [x for x in transmission.iter("mechanicalReduction")]
+        if not found:
+            return 1.0
+        text = (found[0].text or "").strip()
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if len(found) > 1 or not math.isfinite(value) or value == 0.0:
+            self.fail(
+                found[-1],
+                f"<mechanicalReduction> of transmission {transmission.get('name')!r} is {text!r}; one finite number is "
+                f"needed, not 0",
+            )
+        return value
 
     def _report(self) -> None:
         """Warn of everything that was not used."""
         self._note_unused(self.robot)
         parts = [f"<{what}> (line {shortened(lines)})" for what, lines in self.unused.items()]
         if self.missing:
-            formats = ", ".join(MESH_FORMATS)
-            parts.append(
-                f"shapes that cannot be drawn, or files that are not found or not {formats} ({shortened(self.missing)})"
-            )
+            parts.append(f"shapes that cannot be drawn ({shortened(self.missing)})")
         if parts:
             warn_user(f"{self.path.name}: not used: {'; '.join(parts)}", ModelWarning)
         if self.renamed:
@@ -508,22 +439,16 @@ class _Reader:
             if name not in known and not name.startswith("xmlns"):
                 self.unused.setdefault(f"{tag.tag} {name}", []).append(line_of(tag))
         for x in tag:
-            if x.tag not in known:
+            if x.tag == "transmission":
+                for y in x.iter():
+                    if y.tag not in IN_TRANSMISSIONS:
+                        self.unused.setdefault(str(y.tag), []).append(line_of(y))
+            elif x.tag not in known:
                 self.unused.setdefault(str(x.tag), []).append(line_of(x))
             else:
                 self._note_unused(x)
 
 
-def line_of(tag: ET.Element) -> int:
-    """Line of the file in which a tag begins."""
-    return getattr(tag, "line", 0)
-
-
 def shortened(items: Sequence[Any]) -> str:
     """The first few items of a list."""
     return ", ".join(map(str, items[:MAX_LISTED])) + (", ..." if len(items) > MAX_LISTED else "")
-
-
-def rows(R: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """A matrix as tuples of its rows."""
-    return tuple(tuple(row) for row in R.tolist())

@@ -1,7 +1,7 @@
 """Writing of a mechanism whose joints form a tree as URDF.
 
 URDF puts the frame of a link at the joint that carries it, with zero joint values in the drawn configuration. What the
-format cannot express is listed in a `ModelWarning`, or refused where the motion would be another one.
+format cannot express is listed in a `ModelWarning` with the reason, or refused where the motion would be another one.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ from ..model.output_files import write_file
 from ..model.shapes.box import Box
 from ..model.shapes.cylinder import Cylinder
 from ..model.shapes.mesh import Mesh
+from ..model.shapes.rod import Rod
 from ..model.shapes.sphere import Sphere
 from ..tables.element_numbers import element_numbers
 from ..tables.forest import TreeBody, tree_bodies
 from ..tables.structure import structure
 from ..tables.values import values
-from .urdf import COORDINATES, STANDARD_GRAVITY
+from .mjcf_writer import control_of, left_out
+from .urdf import COORDINATES, SIMPLE, STANDARD_GRAVITY
 
 TYPES: dict[type[Joint], str] = {Revolute: "revolute", Prismatic: "prismatic", Fixed: "fixed", Planar: "planar"}
 UNLIMITED = 1e9
@@ -74,6 +76,11 @@ class _Writer:
         self.place: dict[str, np.ndarray] = {GROUND: np.eye(4)}
         self.written: set[str] = {j.name for j in model.joints}
         self.missing: list[str] = []
+        other = "URDF has damping and friction of joints and simple transmissions"
+        self.reasons = dict.fromkeys((e.name for e in model.forces), other)
+        self.reasons |= dict.fromkeys((e.name for e in model.limits), "URDF has rigid stops of joints")
+        self.reasons |= dict.fromkeys((e.name for e in model.couplings), "URDF couples two coordinates of joints")
+        self.reasons |= dict.fromkeys((e.name for e in model.ground), "ground has no shapes in URDF")
         self.ground = self._ground_link()
         self.robot = ET.Element("robot", name=model.name)
 
@@ -106,6 +113,7 @@ class _Writer:
                 self._joint(t)
         for e in self.model.frames:
             self._fixed_frame(e)
+        self._transmissions()
         self._report()
         ET.indent(self.robot)
         return '<?xml version="1.0"?>\n' + ET.tostring(self.robot, encoding="unicode") + "\n"
@@ -141,16 +149,19 @@ class _Writer:
 
     def _shape(self, link: ET.Element, name: str, s: Any, n: Any) -> None:
         geometry = ET.Element("geometry")
+        if s.hole:  # not drawn, and its mass is that of the body
+            return
         if isinstance(s, Box):
             ET.SubElement(geometry, "box", size=_row(n.edges))
-        elif isinstance(s, Cylinder):
-            ET.SubElement(geometry, "cylinder", radius=repr(float(n.radius)), length=repr(float(n.length)))
+        elif type(s) in (Cylinder, Rod):
+            radius, length = (repr(float(x)) for x in s.size(n))
+            ET.SubElement(geometry, "cylinder", radius=radius, length=length)
         elif isinstance(s, Sphere):
             ET.SubElement(geometry, "sphere", radius=repr(float(n.radius)))
         elif isinstance(s, Mesh) and s.path is not None:
             ET.SubElement(geometry, "mesh", filename=s.path, scale=_row([n.scale] * 3))
         else:
-            self.missing.append(s.title)
+            self.missing.append(f"{s.title} of {name} (URDF has boxes, cylinders, spheres and mesh files)")
             return
         visual = ET.SubElement(link, "visual")
         place, R = s.pose(n)
@@ -222,6 +233,23 @@ class _Writer:
                     self.written.add(e.name)
         return total
 
+    def _transmissions(self) -> None:
+        """Motors of joints whose torque is a multiple of a parameter, the first of each joint."""
+        driven = set[str]()
+        for e in self.model.forces:
+            control = control_of(self.model, e)
+            joint, _, what = getattr(e, "coordinate_text", str)().partition(".")
+            kind = TYPES.get(type(self.model.find(joint)))  # type: ignore[arg-type]
+            if control is None or COORDINATES.get(kind or "") != what or joint in driven or control[0] == 0.0:
+                continue
+            driven.add(joint)
+            tag = ET.SubElement(self.robot, "transmission", name=f"{e.name}_transmission")
+            ET.SubElement(tag, "type").text = f"transmission_interface/{SIMPLE}"
+            ET.SubElement(tag, "joint", name=joint)
+            motor = ET.SubElement(tag, "actuator", name=e.name)
+            ET.SubElement(motor, "mechanicalReduction").text = repr(control[0])
+            self.written.add(e.name)
+
     def _fixed_frame(self, e: Any) -> None:
         body = e.body
         link = self.ground if body == GROUND else body
@@ -238,9 +266,9 @@ class _Writer:
         ET.SubElement(joint, "child", link=e.name)
 
     def _report(self) -> None:
-        rest = [e.title for e in self.model.elements() if e.name not in self.written] + self.missing
+        rest = left_out(self.model, self.written, self.reasons) + self.missing
         if tuple(self.model.gravity) != (0, 0, -STANDARD_GRAVITY):
-            rest.append(f"gravity {tuple(self.model.gravity)}")
+            rest.append(f"gravity {tuple(self.model.gravity)} ({STANDARD_GRAVITY} m/s^2 along -z, read again)")
         if rest:
             warn_user(f"URDF has no counterpart of {', '.join(rest)}; the file lacks them", ModelWarning)
 

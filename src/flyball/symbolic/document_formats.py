@@ -73,7 +73,7 @@ def connected_parts(e: Any) -> str:
     for name in ("body", "joint", "coordinate"):
         if isinstance(getattr(e, name, None), str):
             return f"on {getattr(e, name)}"
-    coupled = getattr(e, "coupled", None)
+    coupled = getattr(e, "coupled", None) or getattr(e, "along", None)
     return ", ".join(coupled()) if callable(coupled) else ""
 
 

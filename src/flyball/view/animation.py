@@ -65,6 +65,8 @@ def attachment_text(e: Any) -> str:
     about = getattr(e, "joint", None) or getattr(e, "coordinate", None)
     if isinstance(about, str):
         return f"on {about}"
+    if isinstance(about, tuple):
+        return f"on {', '.join(about)}"
     measured = getattr(e, "of", None) or getattr(e, "frame", None)
     return f"of {measured}" if isinstance(measured, str) else ""
 
@@ -242,7 +244,8 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
     numbers = places.result.values.numbers[e.name]
     if len(ends) > 1:
         points = [places.track(end)[0] for end in ends]
-        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=_free_length(numbers, points)[every])
+        rest = _free_length(numbers, points)[every] if e.single == "rope" else None  # others are never slack
+        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=rest)
     pair = places.ends(e)
     if pair is None or e.symbol not in ("spring", "damper"):
         return None

@@ -273,7 +273,7 @@ def coordinate_spring_line(
     The model does not define its other end; it is placed beyond the range and the rest position of the coordinate.
     """
     numbers = places.result.values.numbers[e.name]
-    if not isinstance(e, CoordinateForce) or not hasattr(numbers, "stiffness"):
+    if not isinstance(e, CoordinateForce) or not hasattr(numbers, "stiffness") or not e.coordinate_text():
         return None
     if numbers.stiffness == 0.0 and numbers.damping == 0.0:
         return None

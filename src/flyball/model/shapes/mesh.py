@@ -24,7 +24,8 @@ from .solid import RESOLUTION, Solid
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-MESH_FORMATS = (".stl", ".obj", ".ply", ".off")
+COLLADA = ".dae"
+MESH_FORMATS = (".stl", ".obj", ".ply", ".off", COLLADA)
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
@@ -45,10 +46,14 @@ def current_folder() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """Vertices (k, 3) and triangles (m, 3) with derived quantities, in their own units."""
+    """Vertices (k, 3) and triangles (m, 3) with derived quantities, in their own units.
+
+    ``color`` is that of the first part of a file whose parts have colours, as ``#rrggbb``; else empty.
+    """
 
     v: np.ndarray
     f: np.ndarray
+    color: str = ""
 
     @cached_property
     def flaws(self) -> str:
@@ -92,15 +97,16 @@ class Mesh(Solid):
     Parameters
     ----------
     path : str
-        An STL, OBJ, PLY or OFF file. A relative path refers to the folder of the model file, or to the current folder
-        for a mechanism described in Python. Reading requires the package trimesh.
+        An STL, OBJ, PLY, OFF or Collada (DAE) file. A relative path refers to the folder of the model file, or to the
+        current folder for a mechanism described in Python. Reading requires the package trimesh, and pycollada for
+        Collada.
     vertices : (k, 3) numbers
         In place of a path; in units of ``scale``.
     faces : (m, 3) whole numbers
         With ``vertices``: three indices of vertices, from 0, for each triangle.
     scale : number [m]
-        Length of one unit of the file or of the vertices: ``"1 mm"`` for a drawing in millimetres. Files do not state
-        it; 1 m if not given.
+        Length of one unit of the file or of the vertices: ``"1 mm"`` for a drawing in millimetres; 1 m if not given.
+        Only Collada files state their unit: they are read in metres.
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
@@ -261,7 +267,7 @@ def read_mesh(file: str, *stamp: int) -> Triangulation:
     Raises
     ------
     ModelError
-        If trimesh is not installed, or cannot read it.
+        If a package is not installed, or cannot read it.
     """
     kind = Path(file).suffix.lower()
     if kind not in MESH_FORMATS:
@@ -270,13 +276,29 @@ def read_mesh(file: str, *stamp: int) -> Triangulation:
         )
     try:
         import trimesh
-    except ImportError:
-        raise ModelError("reading mesh files takes the package trimesh: pip install trimesh") from None
+
+        if kind == COLLADA:
+            import collada  # noqa: F401
+    except ImportError as error:
+        raise ModelError(
+            f"reading {kind} files takes the package {error.name}: pip install 'flyball[meshes]'"
+        ) from None
     try:
-        loaded: Any = trimesh.load(file, force="mesh", process=False)
-        v, f = np.array(loaded.vertices, float), np.array(loaded.faces, int)
+        scene: Any = trimesh.load(file, force="scene", process=False)
+        parts = [x for x in scene.dump() if hasattr(x, "faces")]
+        unit = trimesh.units.unit_conversion(parts[0].units, "meters") if kind == COLLADA and parts else 1.0
+        color = next((_hex(x.visual) for x in parts if x.visual.defined), "")
+        v = np.concatenate([np.zeros((0, 3)), *(x.vertices for x in parts)]) * unit
+        first = np.cumsum([0, *(len(x.vertices) for x in parts)])
+        f = np.concatenate([np.zeros((0, 3), int), *(x.faces + k for x, k in zip(parts, first[:-1], strict=True))])
     except Exception as error:  # trimesh raises many kinds of errors for invalid files
         raise ModelError(f"{file!r} cannot be read as {kind[1:].upper()}: {error}") from None
     if v.ndim != 2 or not np.isfinite(v).all():
         raise ModelError(f"{file!r} has vertices that are no points")
-    return Triangulation(*weld_vertices(v, f))
+    return Triangulation(*weld_vertices(v, f), color)
+
+
+def _hex(visual: Any) -> str:
+    """Return the main colour of a part of a file."""
+    rgba = visual.material.main_color if hasattr(visual, "material") else visual.main_color
+    return "#" + "".join(f"{int(x):02x}" for x in rgba[:3])

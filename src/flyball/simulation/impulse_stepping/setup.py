@@ -521,7 +521,7 @@ def stops_as_springs(model: Model) -> Model:
     out.limits = [e for e in out.limits if e.acts()]
     for e in rigid:
         del out.by_name[e.name]
-        out.add(measuring_spring(e.name, e.coordinate))
+        out.add(measuring_spring(e))
     return out.snapshot()
 
 
