@@ -26,6 +26,7 @@ from ..engine.entry_point import characteristic_rate_within
 from ..engine.kinematics import quaternion_at
 from ..engine.loads import force_row
 from ..math.vec import mm, transpose
+from ..model.body import GROUND
 from ..model.joint import Joint
 from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 from ..numerics.integrators.radau_stages import RADAU_A as RADAU
@@ -419,7 +420,31 @@ def _lifting_energy(result: Result) -> float:
 
 def impulse_stepping_warnings(result: Result) -> tuple[str, ...]:
     """Return all warnings on a motion by impulse time stepping."""
-    return (*result.health.remarks, *result.health.doubtful, *pull_warnings(result))
+    return (*result.health.remarks, *result.health.doubtful, *_rotation_per_step(result), *pull_warnings(result))
+
+
+MAX_ROTATION = 0.3  # [rad] in a step: a joint then turns too slowly by 0.3**2 / 48, or 0.2 per cent
+
+
+def _rotation_per_step(result: Result) -> tuple[str, ...]:
+    """Return a warning where a body on a joint turns so far in a step that closing the joint costs rotation.
+
+    A step of width h moves the bodies with their velocities at its middle, and the joints are closed afterwards. A
+    hinge with the rate w then turns by w h (1 - (w h)^2 / 48) (expanded for small w h).
+    """
+    contact, model = result.health.contact, result.model
+    if contact is None or model.planar:
+        return ()
+    step = min(contact.step, float(np.diff(result.t).max(initial=0.0)))  # steps end at the output times
+    jointed = {model.carrier(end, joint) for joint in model.joints for end in joint.ends().values()} - {GROUND}
+    turns = {name: np.linalg.norm(result[name].angular_velocity, axis=1).max() * step for name in jointed}
+    name = max(turns, key=lambda k: turns[k], default="")
+    if not name or not turns[name] > MAX_ROTATION:
+        return ()
+    return (
+        f"{name} turns by up to {turns[name]:.2g} rad in a step, and by about {100 * turns[name] ** 2 / 48:.2g} per cent "
+        f"too little: take shorter steps, method=fb.Stepping(step={step * MAX_ROTATION / turns[name]:.1g})",
+    )
 
 
 def expected_imbalance(result: Result) -> float:
