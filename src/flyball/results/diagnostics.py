@@ -430,7 +430,7 @@ def _rotation_per_step(result: Result) -> tuple[str, ...]:
     """Return a warning where a body on a joint turns so far in a step that closing the joint costs rotation.
 
     A step of width h moves the bodies with their velocities at its middle, and the joints are closed afterwards. A
-    hinge with the rate w then turns by w h (1 - (w h)^2 / 48) (expanded for small w h).
+    hinge with the rate w then turns too little by up to (w h)^2 / 48: that is with the mass centre on its axis.
     """
     contact, model = result.health.contact, result.model
     if contact is None or model.planar:
@@ -441,9 +441,10 @@ def _rotation_per_step(result: Result) -> tuple[str, ...]:
     name = max(turns, key=lambda k: turns[k], default="")
     if not name or not turns[name] > MAX_ROTATION:
         return ()
+    lost = 100.0 * turns[name] ** 2 / 48.0
     return (
-        f"{name} turns by up to {turns[name]:.2g} rad in a step, and by about {100 * turns[name] ** 2 / 48:.2g} per cent "
-        f"too little: take shorter steps, method=fb.Stepping(step={step * MAX_ROTATION / turns[name]:.1g})",
+        f"{name} turns by up to {turns[name]:.2g} rad in a step, and by up to {lost:.2g} per cent too little: "
+        f"take shorter steps, method=fb.Stepping(step={step * MAX_ROTATION / turns[name]:.1g})",
     )
 
 
