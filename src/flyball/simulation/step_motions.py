@@ -15,10 +15,11 @@ from ..laws.python_functions import clear_faults, deferred_interrupts
 from ..model.model import Model
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
+from ..results.body_sets import BodySetMotion
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import assign, copied
 from .diagnosis import failure_reason
-from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, begin_by_impulses
+from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, OutputRecorder, begin_by_impulses, body_sets
 from .impulse_stepping.stepper import NoSolution, SavedState
 from .initial_state import InitialState
 from .integration_intervals import SmoothIntervals, known_breaks, laws_checked_in_steps, laws_of_time
@@ -49,6 +50,9 @@ class StepMotion(Protocol):
 
     def write_state(self, x: Measurement) -> None:
         """Write the state to that measurement."""
+
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return the sets of bodies at the present time, by name."""
 
     def save(self) -> Any:
         """Return a copy of all that `advance` changes."""
@@ -139,6 +143,10 @@ class IntegratedMotion:
         """Write the state to the measurement."""
         x.state[self._to] = self._sign * self.clock.y.current.take(self._from)
 
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return nothing: sets of bodies move by impulse time stepping."""
+        return {}
+
     def save(self) -> IntegratedState:
         """Return copies of the integrator's state and the engine's workspace."""
         return IntegratedState(copied(self.clock), copied(self.c.work))
@@ -184,6 +192,7 @@ class ImpulseMotion:
         self, model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, inputs: Sequence[str]
     ) -> None:
         base, scene, self.stepper, self.held, self.chosen = begin_by_impulses(model, t, o, parameters)
+        self._model, self._scene = model, scene
         self.stepper.state.times.now = t
         self.c = base.compiled
         self.structure = self.c.structure
@@ -265,6 +274,12 @@ class ImpulseMotion:
             state[b.v] = (twist.take(b.twist)[:, None] @ rotation)[:, 0]  # R^T w, in body axes
         if self.held:
             state[self._to] = self.stepper.joints.clock.y.current.take(self._from)
+
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return the sets of bodies at the present time, by name."""
+        recorder = OutputRecorder(self.stepper, None, np.zeros(0, np.int64))
+        recorder.add(False)
+        return body_sets(self._model, self._scene, recorder)
 
     def save(self) -> SavedState:
         """Return copies of the stepper's tables."""

@@ -16,10 +16,11 @@ from ..model.body import Initial
 from ..model.expressions import number
 from ..model.model import Model
 from ..model.unsupported_elements import unsupported_elements
+from ..results.result import Result
 from ..tables.structure_definition import velocity_names
 from .initial_state import find_initial_state
 from .integration_options import Integration, Stepping, default_integration
-from .measurement import Measurement, model_with_inputs
+from .measurement import Measurement, StateSample, model_with_inputs
 from .method_choice import AUTO_METHOD, IMPULSE_METHOD, IMPULSE_STEPPING, unknown_to_impulse_stepping
 from .step_motions import ImpulseMotion, IntegratedMotion, StepMotion
 
@@ -335,6 +336,19 @@ class Stepper:
             self._copies[k] = x
             self._measure(k)
         self._inputs[:] = saved.inputs
+
+    def sample(self, copy: int = 0) -> StateSample:
+        """Return time and state of a copy, from which `motion` makes a result."""
+        x = self._copies[copy]
+        return x.measurement.sample(self._time(x), x.motion.sets())
+
+    def motion(self, samples: Sequence[StateSample]) -> Result:
+        """Return the motion through samples of this stepper, in the order of time, as a result.
+
+        It has positions, velocities, energies of the bodies and what laws measure. Accelerations and reactions are nan:
+        steps do not keep them.
+        """
+        return self._copies[0].measurement.motion(samples)
 
     def pose(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return position [m] and rotation of a body's reference frame or a named frame, in the world.

@@ -93,6 +93,16 @@ export class Stage {
     controls.addEventListener("change", () => (this.dirty = true));
   }
 
+  /** Show another mechanism in place of this one, from where one looks. */
+  replace(mechanism, points) {
+    this.retired ??= [];
+    this.retired.push(this.mechanism);
+    for (const part of [this.mechanism.root, this.mechanism.overlay]) part.removeFromParent();
+    Object.assign(this, { mechanism, points, dirty: true });
+    this.scene.add(mechanism.root);
+    this.top.add(mechanism.overlay);
+  }
+
   get size() {
     return [Math.max(this.element.clientWidth, 1), Math.max(this.element.clientHeight, 1)];
   }
@@ -240,7 +250,18 @@ export class Stage {
     this.renderer.autoClear = false;
     this.renderer.clearDepth();
     this.renderer.render(this.top, this.camera);
+    for (const old of this.retired?.splice(0) ?? []) old.dispose(); // after a picture of the new one, which shares shaders
     return true;
+  }
+
+  /** The point of the world under a point of the element: in the plane, or as far away as another point. */
+  pointAt(x, y, beside) {
+    const [width, height] = this.size;
+    const near = new THREE.Vector3((2 * x) / width - 1, 1 - (2 * y) / height, -1).unproject(this.camera);
+    if (this.planar) return near.setZ(0);
+    const sight = this.camera.getWorldDirection(new THREE.Vector3());
+    const ray = near.sub(this.camera.position);
+    return ray.multiplyScalar(beside.clone().sub(this.camera.position).dot(sight) / ray.dot(sight)).add(this.camera.position);
   }
 
   /** The part under a point of the element (pixels from its corner), or null. */

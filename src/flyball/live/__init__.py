@@ -1,0 +1,33 @@
+"""A mechanism in the browser while it is computed: sliders for parameters, stepping, and dragging with the mouse.
+
+``session.py`` has the state of one open page and no network code: messages of the page go in, messages to the page come
+out. ``server.py`` serves the page and passes messages on this machine; ``widget.py`` does so in a notebook.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from ..model.model import Model
+from .options import LiveOptions, make_sliders
+
+
+def show_live(model: Model, o: LiveOptions) -> Any:
+    """Show a model live; see `Mechanism.live`."""
+    model = model.snapshot()
+    make_sliders(model, o.ranges)  # refuses invalid ranges
+    if in_notebook():
+        from .widget import live_widget
+
+        return live_widget(model, o)
+    from .server import serve_model
+
+    serve_model(lambda: model, o, lambda address, note: print(f"{address}\n{note}"))
+    return None
+
+
+def in_notebook() -> bool:
+    """Return whether this is the kernel of a notebook."""
+    ask = getattr(sys.modules.get("IPython"), "get_ipython", None)
+    return ask is not None and getattr(ask(), "kernel", None) is not None
