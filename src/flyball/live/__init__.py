@@ -10,13 +10,12 @@ import sys
 from typing import Any
 
 from ..model.model import Model
-from .options import LiveOptions, make_sliders
+from .options import LiveOptions as LiveOptions
 
 
 def show_live(model: Model, o: LiveOptions) -> Any:
     """Show a model live; see `Mechanism.live`."""
     model = model.snapshot()
-    make_sliders(model, o.ranges)  # refuses invalid ranges
     if in_notebook():
         from .widget import live_widget
 

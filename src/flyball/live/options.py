@@ -51,7 +51,7 @@ class Slider:
             If the value is not a finite number. One outside the range is accepted: it can be typed.
         """
         if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
-            raise ModelError(f"parameter {self.name!r} is moved to {value!r}; it must be a finite number")
+            raise ModelError(f"parameter {self.name!r} is moved to {str(value)[:40]!r}; it must be a finite number")
         return replace(self, value=float(value))
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import FlyballError, ModelError
 from ..model.model import Model
 from ..view.page import live_page
-from .options import LiveOptions
+from .options import LiveOptions, make_sliders
 from .session import LiveSession, encode
 
 HOST = "127.0.0.1"
@@ -27,6 +27,10 @@ LARGEST_MESSAGE = 4096
 """Bytes of a message of the page; a connection with larger ones is closed."""
 MOST_PAGES = 8
 """Pages open at once: each computes in a thread of its own."""
+MOST_AT_ONCE = 1000
+"""Messages taken before work goes on: a page that never pauses does not stop it."""
+CLOSING = 2.0
+"""Time that a page has to close its connection [s]."""
 MOST_REFUSED = 50
 """Messages that make no sense before a connection is closed."""
 PAGE_HEADERS = {
@@ -81,7 +85,9 @@ class LiveServer:
         self._token = secrets.token_urlsafe(24)
         self._pages = threading.BoundedSemaphore(MOST_PAGES)
         self._ending = threading.Event()
-        self._name = load().name
+        model = load()
+        make_sliders(model, o.ranges)  # refuses invalid ranges
+        self._name = model.name
         try:
             self._server = serve(
                 self._serve_page,
@@ -90,6 +96,7 @@ class LiveServer:
                 process_request=self._process_request,
                 max_size=LARGEST_MESSAGE,
                 compression=None,
+                close_timeout=CLOSING,
                 ping_interval=None,  # a page computes for longer than a ping may take; a closed one ends its connection
                 server_header=None,
             )
@@ -163,7 +170,7 @@ class LiveServer:
             """Take all messages that wait, after waiting for the first."""
             nonlocal refused
             try:
-                while True:
+                for _ in range(MOST_AT_ONCE):
                     text = connection.recv(timeout=timeout)
                     timeout = 0.0
                     try:
