@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from ..errors import ModelError
 from ..model.model import Model
 from .options import LiveOptions as LiveOptions
 
@@ -18,6 +19,9 @@ def show_live(model: Model, o: LiveOptions) -> Any:
     model = model.snapshot()
     if in_notebook():
         from .widget import live_widget
+
+        if o.port or o.no_open:
+            raise ModelError("port and no_open have no effect in a notebook: the page is a widget; leave them out")
 
         return live_widget(model, o)
     from .server import serve_model

@@ -16,23 +16,19 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from ..errors import FlyballError, ModelError
+from ..errors import ModelError
 from ..model.model import Model
 from ..view.page import live_page
 from .options import LiveOptions, make_sliders
-from .session import LiveSession, encode
+from .session import ClosedPage, LiveSession, converse
 
 HOST = "127.0.0.1"
 LARGEST_MESSAGE = 4096
 """Bytes of a message of the page; a connection with larger ones is closed."""
 MOST_PAGES = 8
 """Pages open at once: each computes in a thread of its own."""
-MOST_AT_ONCE = 1000
-"""Messages taken before work goes on: a page that never pauses does not stop it."""
 CLOSING = 2.0
 """Time that a page has to close its connection [s]."""
-MOST_REFUSED = 50
-"""Messages that make no sense before a connection is closed."""
 PAGE_HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
@@ -40,10 +36,6 @@ PAGE_HEADERS = {
     "X-Frame-Options": "DENY",
 }
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013  # codes of closed WebSockets
-
-
-class ClosedPage(Exception):
-    """The page has been closed."""
 
 
 class LiveServer:
@@ -155,48 +147,29 @@ class LiveServer:
             return
         try:
             self._converse(connection)
-        except ClosedPage:
-            pass
+        except ClosedPage as ended:
+            connection.close(POLICY_VIOLATION, str(ended))
         finally:
             self._pages.release()
 
     def _converse(self, connection: Any) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        session = LiveSession(self._load, self._options, self._file, self._wording)
-        refused = 0
-
-        def take(timeout: float | None) -> None:
-            """Take all messages that wait, after waiting for the first."""
-            nonlocal refused
+        def receive(timeout: float | None) -> str | bytes:
+            if self._ending.is_set():
+                raise ClosedPage
             try:
-                for _ in range(MOST_AT_ONCE):
-                    text = connection.recv(timeout=timeout)
-                    timeout = 0.0
-                    try:
-                        session.receive(text)
-                    except FlyballError as error:
-                        refused += 1
-                        connection.send(encode("error", {"text": self._wording(str(error))}))
-                        if refused > MOST_REFUSED:
-                            connection.close(POLICY_VIOLATION, "too many messages that make no sense")
-            except TimeoutError:
-                pass
+                return connection.recv(timeout=timeout)  # type: ignore[no-any-return]
             except ConnectionClosed:
                 raise ClosedPage from None
 
-        def poll() -> None:
-            if self._ending.is_set():
-                raise ClosedPage
-            take(0.0)
+        def send(message: bytes) -> None:
+            try:
+                connection.send(message)
+            except ConnectionClosed:
+                raise ClosedPage from None
 
-        while True:
-            take(session.wait())
-            for message in session.work(poll):
-                try:
-                    connection.send(message)
-                except ConnectionClosed:
-                    raise ClosedPage from None
+        converse(LiveSession(self._load, self._options, self._file, self._wording), receive, send)
 
 
 def serve_model(

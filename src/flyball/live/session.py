@@ -26,6 +26,7 @@ import math
 import struct
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,10 @@ from .dragging import AssemblyDrag, DragTarget
 from .options import LiveOptions, Slider, make_sliders
 from .stepping import LiveStepping
 
+MOST_AT_ONCE = 1000
+"""Messages taken before work goes on: a page that never pauses does not stop it."""
+MOST_REFUSED = 50
+"""Messages that make no sense before a page is closed."""
 SLOW_RUN = 1.0
 """Duration of a run [s] from which the page says how slow it is."""
 LOOK_AT_FILE = 0.3
@@ -49,6 +54,10 @@ PICTURE = 1.0 / 30.0
 """Interval between two pictures while stepping [s]."""
 KNOWN_ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 """Energies that positions and velocities determine."""
+
+
+class ClosedPage(Exception):
+    """The page has been closed."""
 
 
 class SupersededRun(Exception):
@@ -92,7 +101,7 @@ class LiveSession:
         self._due: list[str] = ["model", "run"]  # what is to be done, in this order
         self._playing, self._speed, self._single = False, 1.0, 0
         self._model: Model | None = None
-        self._drag_began, self._drawing = 0.0, False
+        self._drag_began, self._drawing, self._refused = 0.0, False, 0
         self._commands: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "set": self._set,
             "start": self._start,
@@ -173,6 +182,19 @@ class LiveSession:
     def _ask(self, what: str) -> None:
         if what not in self._due:
             self._due.append(what)
+
+    def refusal(self, error: FlyballError) -> bytes:
+        """Return the answer to a message that was refused.
+
+        Raises
+        ------
+        ClosedPage
+            If it was one of too many.
+        """
+        self._refused += 1
+        if self._refused > MOST_REFUSED:
+            raise ClosedPage("too many messages that make no sense")
+        return encode("error", {"text": self._wording(str(error))})
 
     # ---- work
 
@@ -354,6 +376,43 @@ class LiveSession:
             frames=(),
             arrows=(),
         )
+
+
+def converse(
+    session: LiveSession, receive: Callable[[float | None], str | bytes], send: Callable[[bytes], None]
+) -> None:
+    """Pass messages between a page and its session until the page is closed.
+
+    Parameters
+    ----------
+    session : LiveSession
+    receive : callable
+        Returns the next message of the page, waiting for this time [s] at most (None: until there is one); it raises
+        TimeoutError if there is none, and ClosedPage if the page is closed.
+    send : callable
+        Sends a message to the page; it raises ClosedPage if the page is closed.
+
+    Raises
+    ------
+    ClosedPage
+        In the end.
+    """
+
+    def take(timeout: float | None) -> None:
+        """Take all messages that wait, after waiting for the first."""
+        with suppress(TimeoutError):
+            for _ in range(MOST_AT_ONCE):
+                text = receive(timeout)
+                timeout = 0.0
+                try:
+                    session.receive(text)
+                except FlyballError as error:
+                    send(session.refusal(error))
+
+    while True:
+        take(session.wait())
+        for message in session.work(lambda: take(0.0)):
+            send(message)
 
 
 def slow_remark(seconds: float, span: float) -> str:

@@ -100,7 +100,7 @@ def _remark(t: np.ndarray, rates: dict[str, np.ndarray]) -> str:
     name = max(turns, key=lambda k: turns[k], default="")
     if not name or turns[name] <= TURN_BETWEEN_OUTPUTS * (1.0 + 1e-9):
         return ""
-    needed = _rounded_up(math.ceil((len(t) - 1) * turns[name] / TURN_BETWEEN_OUTPUTS) + 1)
+    needed = _rounded_up(math.ceil((len(t) - 1) * turns[name] / TURN_BETWEEN_OUTPUTS - 1e-6) + 1)
     too_far = f"{name} turns by {turns[name]:.2g} of a turn between two output times: too far apart to show its motion"
     if needed <= MOST_SHOWN:
         return f"{too_far}; outputs={needed} would show it"
