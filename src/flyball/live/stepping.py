@@ -26,7 +26,7 @@ MOST_SAMPLES = 4
 """States of one picture that are kept for the curves."""
 BUDGET = 0.04
 """Time for the steps of one picture [s]; what is not done by then is left out, and the page says so."""
-LONGEST_GAP = 0.25
+LONGEST_GAP = 1.0
 """Time between two pictures [s] for which steps are made up: a page that was hidden for longer goes on from there."""
 SPRING_PHASE = 0.25
 """Angular frequency of the mouse's spring, times a step: the force is constant in a step, which larger values feel."""

@@ -47,7 +47,7 @@ class Parameter {
 
 class Live {
   constructor() {
-    Object.assign(this, { player: null, parameters: [], stepping: false, values: {}, waiting: 0, latest: null, runs: 0 });
+    Object.assign(this, { player: null, parameters: [], stepping: false, values: {}, waiting: 0, latest: null, runs: 0, pictures: 0 });
     this.send = connect(
       (message) => this.#take(message),
       (text) => this.#end(text),
@@ -93,7 +93,7 @@ class Live {
   }
 
   #run({ values, seconds, slow }, recording) {
-    Object.assign(this, { values, runs: this.runs + 1 });
+    Object.assign(this, { values, runs: this.runs + 1, pictures: 0 });
     this.#fault("");
     this.#slow(slow);
     const span = recording.t.at(-1) - recording.t[0];
@@ -118,6 +118,7 @@ class Live {
 
   #motion({ restart, slow, closure }, chunk) {
     this.player.extend(chunk, restart);
+    this.pictures += 1; // since the last run
     this.closure = closure ?? null;
     this.#slow(slow);
     if (closure === undefined) this.#say(`${this.stepping ? "stepping" : "stepped"}, ${shortNumber(chunk.t.at(-1))} s`);

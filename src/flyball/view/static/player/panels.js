@@ -51,6 +51,7 @@ export function channelPicker(panel, button, known, shown, onChange) {
     panel.hidden = !on;
     button.setAttribute("aria-expanded", String(on));
     if (on) {
+      panel.style.setProperty("--under", `${button.offsetTop + button.offsetHeight + 6}px`);
       fill();
       search.focus();
     }
