@@ -22,7 +22,7 @@ from .options import Slider
 
 MOST_PULLED = 40
 """Bodies that can be pulled: each adds a force and a torque to every step."""
-MOST_SAMPLES = 4
+MOST_SAMPLES = 12
 """States of one picture that are kept for the curves."""
 BUDGET = 0.04
 """Time for the steps of one picture [s]; what is not done by then is left out, and the page says so."""

@@ -178,7 +178,7 @@ export class Plot {
           pxAlign: 0,
           points: { show: this.times.length === 1 },
         })),
-        ...this.motions.flatMap(({ colour }) => this.channels.map(() => ({ stroke: colour, width: 1.2, points: { show: false } }))),
+        ...this.motions.flatMap(({ colour }) => this.channels.map(() => ({ stroke: colour, width: 1.2, pxAlign: 0, points: { show: false } }))),
       ],
     };
   }
