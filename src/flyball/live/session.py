@@ -82,6 +82,11 @@ class LiveSession:
         The model's file, which is watched.
     wording : callable
         Converts the text of an error to that of the terminal.
+
+    Attributes
+    ----------
+    sliders : dict of str to Slider
+        Parameters that can be moved, with their present values; empty until `work` has loaded the model.
     """
 
     def __init__(
@@ -93,7 +98,7 @@ class LiveSession:
     ) -> None:
         self._load, self._options, self._file, self._wording = load, o, file, wording
         self._changed, self._looked = _time_of_change(file), time.monotonic()
-        self._sliders: dict[str, Slider] = {}
+        self.sliders: dict[str, Slider] = {}
         self._result: Result | None = None
         self._stepping: LiveStepping | None = None
         self._drag: AssemblyDrag | None = None
@@ -136,9 +141,9 @@ class LiveSession:
 
     def _set(self, message: Mapping[str, Any]) -> None:
         name = message.get("name")
-        if not isinstance(name, str) or name not in self._sliders:
+        if not isinstance(name, str) or name not in self.sliders:
             raise ModelError(f"there is no parameter {str(name)[:80]!r} to move")
-        self._sliders[name] = self._sliders[name].moved(message.get("value"))
+        self.sliders[name] = self.sliders[name].moved(message.get("value"))
         self._drag = self._target = None
         if self._stepping is not None and self._stepping.accepts(name):
             return
@@ -255,10 +260,10 @@ class LiveSession:
             raise
         before = self._model.parameters if self._model is not None else {}
         for name, slider in new.items():
-            old = self._sliders.get(name)
+            old = self.sliders.get(name)
             if old is not None and before.get(name) == model.parameters[name]:
                 new[name] = dataclasses.replace(slider, value=old.value)
-        self._model, self._sliders = model, new
+        self._model, self.sliders = model, new
         yield encode(
             "model",
             {
@@ -270,7 +275,7 @@ class LiveSession:
         )
 
     def _parameters(self) -> dict[str, float | str]:
-        return {name: x.quantity for name, x in self._sliders.items()}
+        return {name: x.quantity for name, x in self.sliders.items()}
 
     def _known_model(self) -> Model:
         if self._model is None:
@@ -280,7 +285,7 @@ class LiveSession:
     def _run(self, poll: Callable[[], None]) -> Iterator[bytes]:
         """Simulate with the present values of the sliders, and show the motion; stepping begins again."""
         model, o = self._known_model(), self._options
-        values = {name: x.value for name, x in self._sliders.items()}
+        values = {name: x.value for name, x in self.sliders.items()}
         self._stepping = self._drag = self._target = None
         yield encode("busy", {"text": "computing"})
         began, error = time.perf_counter(), None
@@ -314,7 +319,7 @@ class LiveSession:
             if self._result is None:
                 raise ModelError(f"{model.name!r} has no motion yet: nothing can be stepped")
             speed = record_motion(self._result, curves=False).speed
-            self._stepping = LiveStepping(model, self._sliders, speed * PICTURE / 2.0)
+            self._stepping = LiveStepping(model, self.sliders, speed * PICTURE / 2.0)
             self._target = None
             yield self._motion([self._stepping.sample()], True)
         self._stepping.begin_pace()
@@ -325,7 +330,7 @@ class LiveSession:
         x = self._stepping
         assert x is not None
         try:
-            samples = x.advance(self._sliders, self._target, None if self._playing else self._single, self._speed)
+            samples = x.advance(self.sliders, self._target, None if self._playing else self._single, self._speed)
         finally:
             self._single = 0
         if samples:
