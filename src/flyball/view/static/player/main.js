@@ -378,7 +378,7 @@ export class Player {
     if (Math.max(now.unit / this.measures.unit, this.measures.unit / now.unit) > RESIZED) this.measures = now;
     const mechanism = new Mechanism(recording, this.measures.unit, this.measures.extent);
     picture.mechanism = mechanism;
-    picture.stage.replace(mechanism, motionPoints(recording, this.measures.unit));
+    picture.stage.replace(mechanism, () => motionPoints(recording, this.measures.unit));
     picture.names = new Names(find(".names"), mechanism);
     mechanism.retheme(this.theme);
     const names = (m) => [...m.bodies, ...m.crowds, ...m.trails].map(({ name }) => name).join("\n");
@@ -403,6 +403,7 @@ export class Player {
     const { recording, picture, clock, plots } = this;
     extendRecording(recording, chunk, restart);
     picture.mechanism.extended();
+    Object.assign(picture.stage, { points: null, findPoints: () => motionPoints(recording, this.measures.unit) });
     if (restart) this.bar.mark([]);
     plots.extend(recording.t);
     clock.play(false);

@@ -93,12 +93,12 @@ export class Stage {
     controls.addEventListener("change", () => (this.dirty = true));
   }
 
-  /** Show another mechanism in place of this one, from where one looks. */
-  replace(mechanism, points) {
+  /** Show another mechanism in place of this one, from where one looks; `findPoints` is called when they are needed. */
+  replace(mechanism, findPoints) {
     this.retired ??= [];
     this.retired.push(this.mechanism);
     for (const part of [this.mechanism.root, this.mechanism.overlay]) part.removeFromParent();
-    Object.assign(this, { mechanism, points, dirty: true });
+    Object.assign(this, { mechanism, points: null, findPoints, dirty: true });
     this.scene.add(mechanism.root);
     this.top.add(mechanism.overlay);
   }
@@ -130,6 +130,7 @@ export class Stage {
 
   /** Look from a preset, or from where one looks ("fit"); all of the motion is in the picture. */
   look(view, smooth = false) {
+    this.points ??= this.findPoints();
     this.view = view;
     this.followed = null;
     const [width, height] = this.size;
