@@ -39,6 +39,7 @@ Ask how it moves
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
     m.compare(t_end)              -> Comparison of formulations of the equations of motion
+    m.live()                      a page in the browser with sliders, stepping, and bodies dragged with the mouse
     m.stepper(dt, inputs=...)     -> Stepper: advanced by a program outside, for control loops and learning
     m.prepare()                   -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
 

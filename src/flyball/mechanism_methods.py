@@ -448,6 +448,48 @@ class MotionMethods(Model):
 
         return make_stepper(self, StepperOptions.from_arguments(locals()))
 
+    def live(
+        self,
+        t_end: float | str = 5.0,
+        *,
+        outputs: int = 501,
+        ranges: Mapping[str, Sequence[float | str]] | None = None,
+        port: int = 0,
+        no_open: bool = False,
+    ) -> Any:
+        """Show the mechanism in the browser while it is computed: sliders for parameters, stepping, dragging.
+
+        In a notebook the page is a widget, and this returns at once. Elsewhere it is served to this machine only, under
+        an address with a random token, until the user interrupts.
+
+        Parameters
+        ----------
+        t_end : float or str [s]
+            Duration of the motion that is computed again whenever a slider moves.
+        outputs : int
+            Number of output times of that motion.
+        ranges : mapping, optional
+            Parameter to its least and largest value on its slider, in SI units or with a unit. Others get a range about
+            their value, and the page says so.
+        port : int
+            Port of the server; 0 selects a free one.
+        no_open : bool
+            Only print the address; open no browser.
+
+        Returns
+        -------
+        widget or None
+            In a notebook the widget; elsewhere nothing.
+
+        Raises
+        ------
+        ModelError
+            If a range is invalid, or the package websockets (in a notebook anywidget) is not installed.
+        """
+        from .live import LiveOptions, show_live
+
+        return show_live(self, LiveOptions.from_arguments(locals()))
+
     def compare(
         self,
         t_end: float | str,

@@ -49,6 +49,7 @@ LAYERS = (  # from the foundation up: a package imports, when it is imported, on
     "linear",
     "sensitivity studies symbolic",
     "view",
+    "live",
     "mechanism_methods",
     "mechanism cli",
     "testing __init__ __main__",
@@ -71,7 +72,7 @@ STANDS_ALONE = {  # these import no more than this of what is below them
 LATER = {  # imports inside functions of what stands above: methods that lead from a thing to what is done with it
     "__init__": {"model"},
     "assembly": {"mobility"},
-    "cli": {"compiler", "mechanism", "model", "view"},
+    "cli": {"compiler", "live", "mechanism", "model", "view"},
     "controllers": {"expression_graph"},
     "derivatives": {"simulation"},
     "mechanism": {"results", "robots", "view"},
@@ -241,13 +242,24 @@ def test_compiled_code_is_made_of_stamped_files():
 
 
 def test_only_dispatch_lists_kinds():
-    """Elements are found by registry: no other file names one but readers of formats that have elements of their own."""
+    """Elements are found by registry: no other file names one but readers of formats, and the live page, which add some."""
     names = {c.__name__ for c in fb.Body.registry.values() if c.category in ("joints", "forces")}
     names = {n for n in names if Element.registry[n].__module__.startswith(("flyball.joints.", "flyball.forces."))}
     for path in FILES:
         if (
             room(path)
-            not in ("joints", "forces", "constraints", "model", "elements", "robots", "testing", "view", "__init__")
+            not in (
+                "joints",
+                "forces",
+                "constraints",
+                "model",
+                "elements",
+                "robots",
+                "testing",
+                "view",
+                "live",
+                "__init__",
+            )
             and path.name != "element_dispatch.py"
         ):
             used = {n.id for n in ast.walk(TREES[path]) if isinstance(n, ast.Name)}
@@ -268,7 +280,7 @@ def test_files_stay_small():
     assert {str(p.relative_to(PACKAGE)): n for p, n in lines.items() if n > 600} == {}
     assert 80 < statistics.median(lines.values()) < 200
     one_element_each = {"joints", "forces", "controllers", "constraints", "shapes", "special_pairs"}
-    assert sum(not one_element_each & set(p.parts) for p in FILES) < 400
+    assert sum(not one_element_each & set(p.parts) for p in FILES) < 420
 
 
 def own_lines(function: ast.FunctionDef) -> int:

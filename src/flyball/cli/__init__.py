@@ -20,7 +20,7 @@ from . import view as view
 from .application import app
 
 COMMANDS = (
-    *("run", "check", "view", "new", "compare", "kinematics", "inverse-dynamics"),
+    *("run", "check", "view", "live", "new", "compare", "kinematics", "inverse-dynamics"),
     *("mobility", "singularities", "equilibrium", "equilibria", "linearize", "modes", "root-locus"),
     *("study", "optimize", "sensitivity", "equations", "export", "compile"),
 )

@@ -1,14 +1,15 @@
-"""Subcommands that compute motions: ``run``, ``compare``, ``kinematics`` and ``inverse-dynamics``."""
+"""Subcommands that compute motions: ``run``, ``live``, ``compare``, ``kinematics`` and ``inverse-dynamics``."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from ..errors import Interrupted, SimulationError, SingularityError
+from ..errors import Interrupted, ModelError, SimulationError, SingularityError
 from ..mechanism_methods import MotionMethods
 from .application import (
     FAILED,
@@ -19,8 +20,9 @@ from .application import (
     make_folder,
     print_json,
     print_table,
+    with_option_names,
 )
-from .options import OptionOverride, read_assignments, read_values
+from .options import OptionOverride, read_assignments, read_values, refuse_duplicate
 from .subcommand import Request, command
 
 if TYPE_CHECKING:
@@ -196,3 +198,49 @@ def inverse_dynamics(request: Request, *, out: OutputFolder = None) -> None:
     request.write(folder / "inverse_dynamics.png", found.plot)
     request.write(folder / "result.nc", found.result.save)
     request.print_result(found)
+
+
+def _read_ranges(texts: Sequence[str], unit: str, flag: str) -> dict[str, tuple[float | str, float | str]]:
+    """Parse ranges, each written as ``name=least:largest``."""
+    out: dict[str, tuple[float | str, float | str]] = {}
+    for text in texts:
+        name, equals, ends = (x.strip() for x in text.partition("="))
+        low, colon, high = (x.strip() for x in ends.partition(":"))
+        if not (equals and colon and low and high):
+            raise ModelError(f"{flag} {text!r}: write name=least:largest, for instance {flag} 'speed=30 rpm:90 rpm'")
+        refuse_duplicate(out, name, flag, text)
+        out[name] = (_number_or_quantity(low), _number_or_quantity(high))
+    return out
+
+
+def _number_or_quantity(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+RANGES = OptionOverride(
+    type=list[str],
+    read=_read_ranges,
+    names=("--range",),
+    help="Range of a slider: --range 'speed=30 rpm:90 rpm'; may be repeated. Others are chosen about the value.",
+)
+
+
+@command(MotionMethods.live, overrides={"ranges": RANGES})
+def live(request: Request) -> None:
+    """Ctrl-C ends it. An edit of the model file is shown at once."""
+    from ..live.options import LiveOptions
+    from ..live.server import serve_model
+
+    usual = {k: p.default for k, p in inspect.signature(MotionMethods.live).parameters.items() if k != "self"}
+    o = LiveOptions.from_arguments(usual | request.given)
+
+    def show(address: str, note: str) -> None:
+        if request.as_json:
+            print_json({"address": address})
+        else:
+            typer.echo(f"{address}\n{note}")
+
+    serve_model(request.load, o, show, request.source, with_option_names)

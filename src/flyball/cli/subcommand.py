@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
@@ -109,6 +110,7 @@ class Request:
     given: dict[str, Any]
     source: Path
     as_json: bool
+    load: Callable[[], Mechanism]  # reads the mechanism again, with the same changes
     files: list[str] = field(default_factory=list)
 
     def run_analysis(self, **more: Any) -> Any:
@@ -174,14 +176,13 @@ def command(
 
         def run(**words: Any) -> None:
             with report_errors(words["as_json"]):
-                mechanism = load_mechanism(words["model"])
-                mechanism = leave_out_parts(mechanism, words["without"] or [])
-                set_parameters(mechanism, words["change"] or [])
+                load = partial(_load_changed, words["model"], words["without"] or [], words["change"] or [])
+                mechanism = load()
                 given = {o.name: o.read(words[o.name]) for o in known if _is_given(words[o.name], o)}
                 if "progress" in arguments:
                     given["progress"] = not words["as_json"]
                 show_notices(not words["as_json"])
-                question = Request(mechanism, method.__name__, given, words["model"], words["as_json"])
+                question = Request(mechanism, method.__name__, given, words["model"], words["as_json"], load)
                 conclude(question, **{p.name: words[p.name] for p in extra})
 
         shared = [_keyword_parameter("model", ModelFile), _keyword_parameter("change", ParameterChanges, None)]
@@ -196,6 +197,13 @@ def command(
         return conclude
 
     return register
+
+
+def _load_changed(path: Path, without: Sequence[str], changes: Sequence[str]) -> Mechanism:
+    """Load a mechanism, leave out parts, and set parameters."""
+    mechanism = leave_out_parts(load_mechanism(path), without)
+    set_parameters(mechanism, changes)
+    return mechanism
 
 
 def _is_given(value: Any, of: Option) -> bool:

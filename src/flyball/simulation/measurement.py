@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +20,12 @@ from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..numerics.integrators.butcher_tableaux import tableau
 from ..numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
+from ..results.health import Health
+from ..results.part_views.bodies import BodySetMotion, join_in_time
+from ..results.result import Result
 from ..tables.element_numbers import element_numbers
 from ..tables.law_inputs import element_laws
+from ..tables.values import Values
 
 CHANGED_INPUT = 1.5  # factor of an input's value, to find out which numbers depend on it
 
@@ -93,6 +98,15 @@ class CountedAngles(NamedTuple):
     state: np.ndarray  # entries of the state
     rate: np.ndarray  # entries of the measured values
     factor: np.ndarray  # rate of the state by the measured rate
+
+
+@dataclass(frozen=True)
+class StateSample:
+    """Time [s] and state of one copy of a stepper at an instant; of sets of bodies their motions, at one time."""
+
+    t: float
+    state: np.ndarray
+    sets: Mapping[str, BodySetMotion]
 
 
 class Measurement:
@@ -206,6 +220,17 @@ class Measurement:
         """Return to a saved time and state."""
         self._time.t, self.state[:] = saved
 
+    def sample(self, t: float, sets: Mapping[str, BodySetMotion]) -> StateSample:
+        """Return time and state as last written."""
+        return StateSample(t, self.state.copy(), sets)
+
+    def motion(self, samples: Sequence[StateSample]) -> Result:
+        """Return the motion through states; accelerations and multipliers are nan."""
+        t, rows = np.array([x.t for x in samples]), np.array([x.state for x in samples])
+        result = motion_through_states(self._compiled.values, t, rows)
+        result.bulk = {name: join_in_time([x.sets[name] for x in samples]) for name in samples[0].sets}
+        return result
+
     def outputs(self, out: np.ndarray) -> None:
         """Write the outputs at the state last evaluated."""
         out[:] = self._values[self._columns]
@@ -240,6 +265,26 @@ class Measurement:
             body, row = values.bodies[carrier], self.structure.place[carrier]
             self._frames[name] = (row, p, R) if row < 0 else (row, body.R.T @ (p - body.c), body.R.T @ R)
         return self._frames[name]
+
+
+def motion_through_states(values: Values, t: np.ndarray, rows: np.ndarray) -> Result:
+    """Return a motion of which states are known: accelerations and multipliers are nan.
+
+    Parameters
+    ----------
+    values : Values
+        The mechanism, in the coordinates of the states.
+    t : ndarray (n,) [s]
+    rows : ndarray (n, ny)
+        States (q, v, z).
+    """
+    s, n = values.structure, len(t)
+    q, v, z = (np.ascontiguousarray(x) for x in np.split(rows, [s.nq, s.nq + s.nv], axis=1))
+    vdot = np.full((n, s.nv), np.nan)
+    multipliers = np.full((n, len(values.system.rows.law) + len(s.prescribed)), np.nan)
+    health = Health(True, "states of a motion", np.nan, np.nan, steps=n, rejected=0, evaluations=0, factorisations=0,
+                    seconds=0.0)  # fmt: skip
+    return Result(s.model, values, t, q, v, z, vdot, multipliers, health)
 
 
 def _with_sensors(model: Model, outputs: Sequence[str]) -> tuple[Model, list[str]]:

@@ -25,15 +25,17 @@ from ..model.model import Model
 from ..model.unsupported_elements import unsupported_elements
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
+from ..results.part_views.bodies import BodySetMotion
+from ..results.result import Result
 from ..tables.structure_definition import Structure, velocity_names
 from ..tables.table_definitions import assign, copied
 from .diagnosis import failure_reason
-from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, begin_by_impulses
+from .impulse_stepping.impulse_simulation import NO_WAY_MESSAGE, OutputRecorder, begin_by_impulses, body_sets
 from .impulse_stepping.impulse_stepper import NoSolution, SavedState
 from .initial_state import InitialState, find_initial_state
 from .integration_intervals import SmoothIntervals, known_breaks, laws_checked_in_steps, laws_of_time
 from .integration_options import Integration, Stepping, default_integration
-from .measurement import Measurement, model_with_inputs
+from .measurement import Measurement, StateSample, model_with_inputs
 from .method_choice import AUTO_METHOD, IMPULSE_METHOD, IMPULSE_STEPPING, unknown_to_impulse_stepping
 from .simulate import clock_for, row_width
 
@@ -60,6 +62,9 @@ class StepMotion(Protocol):
 
     def write_state(self, x: Measurement) -> None:
         """Write the state to that measurement."""
+
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return the sets of bodies at the present time, by name."""
 
     def save(self) -> Any:
         """Return a copy of all that `advance` changes."""
@@ -150,6 +155,10 @@ class IntegratedMotion:
         """Write the state to the measurement."""
         x.state[self._to] = self._sign * self.clock.y.current.take(self._from)
 
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return nothing: sets of bodies move by impulse time stepping."""
+        return {}
+
     def save(self) -> IntegratedState:
         """Return copies of the integrator's state and the engine's workspace."""
         return IntegratedState(copied(self.clock), copied(self.c.work))
@@ -195,6 +204,7 @@ class AbsoluteImpulseMotion:
         self, model: Model, t: float, o: Stepping, parameters: Mapping[str, float] | None, inputs: Sequence[str]
     ) -> None:
         base, scene, self.stepper, self.held, self.chosen = begin_by_impulses(model, t, o, parameters)
+        self._model, self._scene = model, scene
         self.stepper.state.times.now = t
         self.c = base.compiled
         self.structure = self.c.structure
@@ -276,6 +286,12 @@ class AbsoluteImpulseMotion:
             state[b.v] = (twist.take(b.twist)[:, None] @ rotation)[:, 0]  # R^T w, in body axes
         if self.held:
             state[self._to] = self.stepper.joints.clock.y.current.take(self._from)
+
+    def sets(self) -> dict[str, BodySetMotion]:
+        """Return the sets of bodies at the present time, by name."""
+        recorder = OutputRecorder(self.stepper, None, np.zeros(0, np.int64))
+        recorder.add(False)
+        return body_sets(self._model, self._scene, recorder)
 
     def save(self) -> SavedState:
         """Return copies of the stepper's tables."""
@@ -598,6 +614,19 @@ class Stepper:
             self._copies[k] = x
             self._measure(k)
         self._inputs[:] = saved.inputs
+
+    def sample(self, copy: int = 0) -> StateSample:
+        """Return time and state of a copy, from which `motion` makes a result."""
+        x = self._copies[copy]
+        return x.measurement.sample(self._time(x), x.motion.sets())
+
+    def motion(self, samples: Sequence[StateSample]) -> Result:
+        """Return the motion through samples of this stepper, in the order of time, as a result.
+
+        It has positions, velocities, energies of the bodies and what laws measure. Accelerations and reactions are nan:
+        steps do not keep them.
+        """
+        return self._copies[0].measurement.motion(samples)
 
     def pose(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return position [m] and rotation of a body's reference frame or a named frame, in the world.

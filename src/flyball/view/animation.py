@@ -18,6 +18,7 @@ from .body_shapes import BodyShapes
 from .event_marks import event_marks
 from .motion_with_events import add_event_states
 from .page import animation_page
+from .playback import Playback, playback_of
 from .recording import (
     SHOW_OPTIONS,
     Channel,
@@ -137,6 +138,7 @@ def record_motion(
         notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
     if left_out:
         notes["contact arrows"] = left_out
+    playback = playback_of(result, every) if with_notes else Playback()
     return Recording(
         name=result.model.name,
         planar=result.planar,
@@ -158,6 +160,8 @@ def record_motion(
         sets=sets,
         contacts=contacts,
         marks=event_marks(motion) if with_notes else (),
+        speed=playback.speed,
+        remark=playback.remark,
     )
 
 

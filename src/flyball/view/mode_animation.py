@@ -62,6 +62,8 @@ def modes_page(
         name=f"{name}: modes",
         notes=_mode_notes(modes, len(shown)),
         modes=tuple(_recorded_mode(modes, k, n) for n, k in enumerate(shown)),
+        speed=1.0,  # one period a second
+        remark="",
     )
     return player_page(recording, f"<h1>{html.escape(recording.name)}</h1>")
 

@@ -144,6 +144,8 @@ def _header(recording: Recording, block: _NumberBlock) -> dict[str, Any]:
         "show": list(recording.show),
         "facts": {part: list(lines) for part, lines in recording.facts.items()},
         "down": _float_list(recording.down),
+        "speed": float(recording.speed),
+        "remark": recording.remark,
         "t": block.add(recording.t, "f8"),
         "bodies": [
             {
@@ -262,10 +264,10 @@ def sign_continuous(q: np.ndarray) -> np.ndarray:
 
 # The player's modules, each after those that it imports.
 PLAYER_MODULES = (
+    "packed",
     "data",
     "format",
     "theme",
-    "packed",
     "solids",
     "flats",
     "look",
@@ -296,12 +298,15 @@ PLAYER_MODULES = (
     "shown",
     "keys",
     "clock",
+    "speeds",
     "bar",
     "swing",
     "modes",
     "overlay",
     "main",
 )
+LIVE_MODULES = ("variants", "grip", "transport", "live")
+"""Those of a live page, which follow."""
 
 
 def animation_page(recording: Recording) -> str:
@@ -338,14 +343,40 @@ def player_page(recording: Recording, heading: str, before: str = "", after: str
         Markup before and after the player.
     """
     title = html.escape(recording.name)
-    stage = fill_template(static("player.html"), {"heading": heading, "title": title})
+    stage = fill_template(static("player.html"), {"heading": heading, "title": title, "live": ""})
     parts = {
         "title": title,
+        "connect": "",
         "licences": static("licences.txt").replace("--", "- -"),
         "style": static("uplot.min.css") + static("page.css"),
         "content": before + stage + after,
         "player": _player_script(),
         "recording": _compressed(pack_recording(recording)),
+        "boot": static("boot.js"),
+    }
+    return fill_template(static("page.html"), parts)
+
+
+def live_page(name: str, connect: str = "") -> str:
+    """Return the page of a live session: the player without a recording, which a session sends.
+
+    Parameters
+    ----------
+    name : str
+        Of the mechanism.
+    connect : str
+        Address that the page may connect to; without it the page speaks with the window around it.
+    """
+    title = html.escape(name)
+    places = {"heading": f"<h1>{title}</h1>", "title": title, "live": static("live.html")}
+    parts = {
+        "title": title,
+        "connect": f"; connect-src {connect}" if connect else "",
+        "licences": static("licences.txt").replace("--", "- -"),
+        "style": static("uplot.min.css") + static("page.css") + static("live.css"),
+        "content": fill_template(static("player.html"), places),
+        "player": _player_script(LIVE_MODULES),
+        "recording": "",
         "boot": static("boot.js"),
     }
     return fill_template(static("page.html"), parts)
@@ -357,11 +388,15 @@ def _compressed(data: bytes) -> str:
 
 
 @cache
-def _player_script() -> str:
-    """Return the libraries and the player as one gzipped script."""
-    modules = "\n".join(_module_as_function(name, static(f"player/{name}.js")) for name in PLAYER_MODULES)
+def _player_script(more: tuple[str, ...] = ()) -> str:
+    """Return the libraries and the player, with more modules of it, as one gzipped script."""
+    names = (*PLAYER_MODULES, *more)
+    modules = "\n".join(_module_as_function(name, static(f"player/{name}.js")) for name in names)
     head = '"use strict";\nconst THREE = LIB, uPlot = LIB.uPlot;\n'
-    script = f"{static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
+    starts = "window.startLive = $live.start;\n" if "live" in more else ""
+    script = (
+        f"{static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n{starts}}})();\n"
+    )
     return _compressed(script.encode())
 
 

@@ -307,6 +307,8 @@ class Recording:
     sets: tuple[RecordedSet, ...] = ()
     contacts: RecordedContacts | None = None
     marks: tuple[Mark, ...] = ()  # marks of events
+    speed: float = 1.0  # seconds of motion in a second of playing, when the page opens
+    remark: str = ""  # shown over the picture
 
 
 SHOW_OPTIONS = {

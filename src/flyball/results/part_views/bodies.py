@@ -5,7 +5,8 @@ A set of many bodies has one array for each quantity, times along axis 0, bodies
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -329,3 +330,9 @@ class BodySetMotion:
 
 def _component_arrays(a: np.ndarray) -> tuple[np.ndarray, ...]:
     return tuple(np.moveaxis(a, -1, 0))
+
+
+def join_in_time(motions: Sequence[BodySetMotion]) -> BodySetMotion:
+    """Return the motions of one set, one after the other, as one."""
+    arrays = {k: np.concatenate([getattr(m, k) for m in motions]) for k in SET_MOTION_ARRAYS}
+    return replace(motions[0], **arrays)  # type: ignore[arg-type]

@@ -17,7 +17,8 @@
     const script = document.createElement("script");
     script.textContent = new TextDecoder().decode(await unpack("player"));
     document.head.append(script);
-    window.startPlayer(await unpack("recording"));
+    if (document.getElementById("recording").textContent) window.startPlayer(await unpack("recording"));
+    else window.startLive();
   } catch (error) {
     fail(error);
   }

@@ -1,17 +1,21 @@
 // The control bar: play, scrub, speed, loop, and the keys that do the same.
 import { element, shortNumber, timeDigits } from "./format.js";
+import { SpeedChoice } from "./speeds.js";
 
 const DENSE = 60; // marks that leave little room to point at one
 const STEP = 1 / 200; // of the whole span, for the arrow keys
 
-/** Wire the bar to the clock; returns what brings the bar up to date. */
+/**
+ * Wire the bar to the clock. Returns `refresh`, which brings the bar up to date, `mark`, which shows other marks, and
+ * `speeds`, which says speeds in other words.
+ */
 export function controlBar(bar, clock, keys, marks = []) {
   const part = (name) => bar.querySelector(`[name=${name}]`);
   const [play, scrub, speed, loop] = ["play", "scrub", "speed", "loop"].map(part);
   const read = bar.querySelector("output");
   const total = bar.querySelector(".total");
-  for (const control of [play, scrub, speed, loop]) control.disabled = clock.still;
   const span = () => {
+    for (const control of [play, scrub, speed, loop]) control.disabled = clock.still;
     const digits = timeDigits((clock.end - clock.begin) * clock.scale);
     Object.assign(scrub, { min: clock.begin, max: clock.end, step: "any" });
     total.textContent = clock.scale ? ` / ${((clock.end - clock.origin) * clock.scale).toFixed(digits)} s` : "";
@@ -22,7 +26,7 @@ export function controlBar(bar, clock, keys, marks = []) {
 
   play.addEventListener("click", () => clock.play(!clock.playing));
   part("start").addEventListener("click", () => clock.seek(clock.begin));
-  speed.addEventListener("change", () => (clock.speed = Number(speed.value)));
+  const choice = new SpeedChoice(speed, part("typed-speed"), clock);
   loop.addEventListener("click", () => {
     clock.looping = !clock.looping;
     loop.setAttribute("aria-pressed", String(clock.looping));
@@ -37,9 +41,9 @@ export function controlBar(bar, clock, keys, marks = []) {
     if (resume) clock.play();
     resume = false;
   });
-  barKeys(keys, clock, { speed, loop });
+  barKeys(keys, clock, { choice, loop });
 
-  return () => {
+  const refresh = () => {
     const digits = span();
     const text = clock.scale ? ((clock.time - clock.origin) * clock.scale).toFixed(digits) : "–";
     read.textContent = text;
@@ -49,15 +53,19 @@ export function controlBar(bar, clock, keys, marks = []) {
     play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
     play.classList.toggle("playing", clock.playing);
   };
+  return { refresh, mark: (other) => addMarks(scrub, clock, other), speeds: (words) => choice.describe(words) };
 }
 
 /** Ticks above the track where something happened: pointing at one tells what, a click goes there. */
 function addMarks(scrub, clock, marks) {
+  for (const old of scrub.parentElement.querySelectorAll(".event")) old.remove();
   const inside = clock.still ? [] : marks.filter(({ t }) => t >= clock.begin && t <= clock.end);
   if (!inside.length) return;
-  const holder = element("span", { className: "track" });
-  scrub.replaceWith(holder);
-  holder.append(scrub);
+  const holder = scrub.closest(".track") ?? element("span", { className: "track" });
+  if (!holder.contains(scrub)) {
+    scrub.replaceWith(holder);
+    holder.append(scrub);
+  }
   holder.classList.toggle("dense", inside.length > DENSE);
   for (const { t, text } of inside) {
     const tick = element("button", { type: "button", className: "event", tabIndex: -1, title: `${text}, ${shortNumber(t)} s` });
@@ -97,10 +105,7 @@ function barKeys(keys, clock, parts) {
     paused(() => clock.seek(clock.end)),
     "Home End",
   );
-  const faster = (by) => () => {
-    parts.speed.selectedIndex = Math.min(Math.max(parts.speed.selectedIndex + by, 0), parts.speed.options.length - 1);
-    parts.speed.dispatchEvent(new Event("change"));
-  };
+  const faster = (by) => () => parts.choice.change(by);
   keys.add("-", "", faster(-1));
   keys.add("+ =", "slower or faster", faster(1), "− +");
   keys.add("l", "play once or again and again", () => parts.loop.click(), "L");

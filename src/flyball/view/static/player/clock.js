@@ -14,6 +14,12 @@ export class Clock {
     this.seek(begin + part * (end - begin));
   }
 
+  /** Another span of time; go to a time, or stay as far as possible. */
+  restrict(begin, end, time = this.time) {
+    Object.assign(this, { begin, end });
+    this.seek(time);
+  }
+
   get still() {
     return !(this.end > this.begin);
   }
@@ -27,6 +33,7 @@ export class Clock {
     this.playing = on && !this.still;
     this.before = null;
     if (this.playing && this.time >= this.end) this.time = this.begin;
+    if (this.playing) this.onPlay?.();
     this.onChange();
   }
 

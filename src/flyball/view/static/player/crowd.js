@@ -17,7 +17,7 @@ export class Crowd {
   constructor(data, colour, { planar, unit, order }) {
     const { name, count } = data;
     Object.assign(this, { name, count, data, planar, colour: data.colors[0] ?? colour, shown: true, category: "set" });
-    this.grid = unpacked(data).grid;
+    unpacked(data);
     this.pictures = new Map(); // picture -> orientations, of the two in use
     this.root = new THREE.Group();
     this.members = new Map();
@@ -59,7 +59,8 @@ export class Crowd {
 
   /** Put every member where it is; between pictures straight on, turned the shorter way. */
   seek({ i, j, f }) {
-    const { count, grid, data } = this;
+    const { count, data } = this;
+    const { grid } = data;
     const [a, b] = [this.#turns(i), this.#turns(j)];
     const out = this.matrices.array;
     const { step, low, scale } = data;
@@ -102,6 +103,11 @@ export class Crowd {
   #pose(k, group) {
     const matrix = new THREE.Matrix4().fromArray(this.matrices.array, 16 * k);
     matrix.decompose(group.position, group.quaternion, new THREE.Vector3());
+  }
+
+  /** Pictures have been added or replaced. */
+  extended() {
+    this.pictures.clear();
   }
 
   /** One member as a part that can be selected and followed. */

@@ -1,5 +1,6 @@
 // The recording as it arrives: a JSON header and one block of numbers, see payload.py.
 import * as THREE from "three";
+import { extendSet } from "./packed.js";
 
 const ALIGNMENT = 8;
 
@@ -92,4 +93,48 @@ export function ridden(body, position, numbers) {
     poseAt(body, { i, j: i, f: 0 }, pose);
     return new THREE.Vector3(...position).applyQuaternion(pose.quaternion).add(pose.position);
   });
+}
+
+const LONGEST = 3000; // times of a recording that grows: earlier ones are forgotten
+
+/** Columns of arrays with `from` and `more` rows, one after the other; the last `kept` rows of both. */
+function joined(old, more, width, kept) {
+  const [from, rows] = [old.length / width, more.length / width];
+  const out = new old.constructor(width * kept);
+  for (let k = 0; k < width; k++) {
+    const column = out.subarray(k * kept, (k + 1) * kept);
+    const first = Math.max(kept - rows, 0);
+    column.set(old.subarray(k * from + from - first, (k + 1) * from));
+    column.set(more.subarray(k * rows + rows - (kept - first), (k + 1) * rows), first);
+  }
+  return out;
+}
+
+/** The last row of columns, `count` times. */
+function repeated(columns, width, count) {
+  const rows = columns.length / width;
+  return columns.constructor.from({ length: width * count }, (_, i) => columns[Math.floor(i / count) * rows + rows - 1]);
+}
+
+/** Put a recording's times in place of another one's, or after them; what it does not have stays, or is unknown. */
+export function extendRecording(recording, chunk, restart) {
+  const count = chunk.t.length;
+  const kept = Math.min(count + (restart ? 0 : recording.t.length), LONGEST);
+  const grown = (old, more, width) => (restart && more ? more : joined(restart ? more : old, more, width, kept));
+  const named = (list, name) => list.find((item) => item.name === name);
+  for (const body of recording.bodies) {
+    const other = named(chunk.bodies, body.name) ?? { p: repeated(body.p, 3, count), q: repeated(body.q, 4, count) };
+    Object.assign(body, { p: grown(body.p, other.p, 3), q: grown(body.q, other.q, 4) });
+  }
+  for (const line of recording.lines) {
+    const other = named(chunk.lines, line.name);
+    line.points = line.points.map((p, k) => grown(p, other?.points[k] ?? repeated(p, 3, count), 3));
+    if (line.rest) line.rest = grown(line.rest, other?.rest ?? repeated(line.rest, 1, count), 1);
+  }
+  for (const channel of recording.channels) {
+    const other = named(chunk.channels, channel.name);
+    channel.values = grown(channel.values, other?.values ?? new Float32Array(count).fill(NaN), 1);
+  }
+  for (const set of recording.sets) extendSet(set, named(chunk.sets, set.name), restart, kept);
+  recording.t = grown(recording.t, chunk.t, 1);
 }

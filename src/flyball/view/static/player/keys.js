@@ -1,7 +1,7 @@
 // The keyboard, and the window that says what it does.
 import { element } from "./format.js";
 
-const TYPING = "input:not([type=range]):not([type=checkbox]), select, textarea, summary, pre";
+const TYPING = "input:not([type=range]):not([type=checkbox]), .live input, select, textarea, summary, pre";
 
 export class Keys {
   /** Keys for an element; `alone` says whether it has the page for itself, else it must be pointed at or focused. */

@@ -1,10 +1,10 @@
 // The player: reads a recording, builds the page's parts and keeps them at one time.
 import { controlBar } from "./bar.js";
 import { Clock } from "./clock.js";
-import { readRecording } from "./data.js";
+import { extendRecording, readRecording } from "./data.js";
 import { drawFigures, reportButtons } from "./report.js";
 import { motionPoints } from "./framing.js";
-import { Modes, periodSpeeds } from "./modes.js";
+import { Modes, periodWords } from "./modes.js";
 import { Keys } from "./keys.js";
 import { Mechanism } from "./mechanism.js";
 import { Names } from "./names.js";
@@ -20,6 +20,7 @@ const INSET = { top: 58, right: 26, bottom: 56, left: 26 }; // px of the picture
 const GAP = 14; // px between the motion and the legend
 const ROOMY = 700; // px of width from which the legend of a few bodies opens by itself
 const FEW = 9;
+const RESIZED = 1.25; // change of the typical length from which symbols are drawn at another size
 const VIEWS = ["iso", "front", "side", "top"];
 const find = (selector) => document.querySelector(selector);
 
@@ -90,11 +91,14 @@ function describe(recording) {
   const span = recording.t.at(-1) - recording.t[0];
   const bodies = bodyCount(recording);
   const { modes } = recording;
+  find(".remark").textContent = recording.remark;
+  find(".remark").hidden = !recording.remark;
   if (modes.length)
     find(".subtitle").textContent = `${bodies}, ${modes.length === 1 ? "1 mode" : `${modes.length} modes`}`;
   else find(".subtitle").textContent = span > 0 ? `${bodies}, ${Number(span.toPrecision(3))} s` : bodies;
-  if (!recording.channels.length && !Object.keys(recording.notes).length) document.body.classList.add("alone");
-  if (!recording.channels.length) document.body.classList.add("plotless");
+  const alone = !recording.channels.length && !Object.keys(recording.notes).length && !find(".live");
+  document.body.classList.toggle("alone", alone);
+  document.body.classList.toggle("plotless", !recording.channels.length);
 }
 
 /** Margins of the picture: the least, the corner that the open legend covers, and ways to keep clear of it. */
@@ -116,8 +120,7 @@ function margins() {
 }
 
 /** The picture, without what steers it. */
-function buildPicture(recording) {
-  const { unit, extent } = measures(recording);
+function buildPicture(recording, { unit, extent }) {
   const mechanism = new Mechanism(recording, unit, extent);
   const stage = new Stage(find(".stage"), mechanism, motionPoints(recording, unit), margins);
   if (!stage.renderer) message("No picture: this browser has WebGL switched off. Plots and the time cursor work.");
@@ -128,10 +131,11 @@ function buildPicture(recording) {
 }
 
 /** One part is selected, or none: it glows, its card is open, the camera may go along. */
-function selection({ mechanism, stage }, card, legend, follow, frame) {
+function selection(picture, card, legend, follow, frame) {
+  const { stage } = picture;
   const state = { part: null };
   const glow = (name, on) => {
-    for (const part of mechanism.parts(name)) part.glow(on || part.name === state.part?.name);
+    for (const part of picture.mechanism.parts(name)) part.glow(on || part.name === state.part?.name);
     stage.dirty = true;
   };
   const select = (part) => {
@@ -140,7 +144,7 @@ function selection({ mechanism, stage }, card, legend, follow, frame) {
     if (before) glow(before.name, false);
     if (part) glow(part.name, true);
     card.show(part, frame());
-    legend.mark(part?.name);
+    legend().mark(part?.name);
     follow.disabled = part?.category !== "body";
     if (stage.followed && follow.disabled) toggleFollow(false);
   };
@@ -149,7 +153,14 @@ function selection({ mechanism, stage }, card, legend, follow, frame) {
     follow.setAttribute("aria-pressed", String(Boolean(stage.followed)));
   };
   follow.addEventListener("click", () => toggleFollow());
-  return { state, glow, select, toggleFollow };
+  /** The same part of another mechanism. */
+  const reselect = (part) => {
+    const followed = Boolean(stage.followed);
+    state.part = null;
+    select(part);
+    if (followed) toggleFollow(Boolean(part));
+  };
+  return { state, glow, select, reselect, toggleFollow };
 }
 
 /** A click without a drag selects what lies under it. */
@@ -218,7 +229,8 @@ function pictureKeys(keys, shown, chosen, theme) {
 }
 
 /** Draw whenever something has changed, for as long as the page lives. */
-function keepDrawing(clock, { stage, names }) {
+function keepDrawing(clock, picture) {
+  const { stage } = picture;
   const turnAxes = axesMark(find(".axes"), stage.planar);
   const showScale = scaleMark(find(".scale"));
   const draw = (now) => {
@@ -227,7 +239,7 @@ function keepDrawing(clock, { stage, names }) {
       stage.camera.updateMatrixWorld();
       turnAxes(stage.camera);
       showScale(stage.scale);
-      names.update(stage.camera, stage.size);
+      picture.names.update(stage.camera, stage.size);
     }
     document.body.dataset.ready ??= "";
     requestAnimationFrame(draw);
@@ -237,95 +249,172 @@ function keepDrawing(clock, { stage, names }) {
 
 /** The legend of bodies, the card, and what selects. */
 function choosing(picture, recording, plots, now) {
-  const { mechanism, stage } = picture;
-  const redraw = () => (stage.dirty = true);
+  const { stage } = picture;
   const card = new Card(find(".card"), recording, {
     onClose: () => chosen.select(null),
     onPlot: (channel) => plots.picker.toggle(channel),
     isPlotted: (channel) => plots.picker.has(channel),
   });
-  const legend = bodyLegend(find(".legend ul"), find(".legend > button"), mechanism, {
-    onShow: (index, on) => redraw(mechanism.show(index, on)),
-    onTrail: (index, on) => redraw(mechanism.trace(index, on)),
-    onSet: (index, on) => redraw(mechanism.crowds[index].show(on)),
-    onPath: (trail, on) => redraw(trail && (trail.root.visible = on)),
-    onPoint: (index, on) => chosen.glow(mechanism.bodies[index].name, on),
-    onSelect: (index) => chosen.select(mechanism.bodies[index]),
-  });
-  const chosen = selection(picture, card, legend, find(".follow"), now);
-  legend.open(
-    innerWidth >= ROOMY && mechanism.bodies.length + mechanism.crowds.length + mechanism.trails.length <= FEW,
-  );
+  let legend = null;
+  const chosen = selection(picture, card, () => legend, find(".follow"), now);
+  const list = () => (legend = legendOf(picture, chosen));
+  list();
+  const { bodies, crowds, trails } = picture.mechanism;
+  legend.open(innerWidth >= ROOMY && bodies.length + crowds.length + trails.length <= FEW);
   stage.resize();
   partTip(find(".stage"), find(".tip"), stage, (part, on) => chosen.glow(part.name, on));
   clicks(stage, chosen.select);
-  return { card, chosen };
+  return { card, chosen, list };
+}
+
+/** The legend of the mechanism in the picture. */
+function legendOf(picture, chosen) {
+  const { stage } = picture;
+  const redraw = () => (stage.dirty = true);
+  return bodyLegend(find(".legend ul"), find(".legend > button"), picture.mechanism, {
+    onShow: (index, on) => redraw(picture.mechanism.show(index, on)),
+    onTrail: (index, on) => redraw(picture.mechanism.trace(index, on)),
+    onSet: (index, on) => redraw(picture.mechanism.crowds[index].show(on)),
+    onPath: (index, on) => redraw(picture.mechanism.showPath(index, on)),
+    onPoint: (index, on) => chosen.glow(picture.mechanism.bodies[index].name, on),
+    onSelect: (index) => chosen.select(picture.mechanism.bodies[index]),
+  });
 }
 
 /** The list of modes where a recording has some; the bar then speaks of periods. */
-function modeList(recording, clock, keys, onSwing) {
+function modeList(recording, clock, keys, bar, onSwing) {
   const { modes } = recording;
   if (!modes.length) return null;
-  periodSpeeds(find(".bar select"), modes[0].end - modes[0].begin);
+  bar.speeds(periodWords(modes[0].end - modes[0].begin));
   return new Modes(find(".modes"), recording, clock, keys, onSwing);
 }
 
 /** Start the player on the bytes of a recording. */
 export function start(buffer) {
-  const recording = readRecording(buffer);
-  const { t } = recording;
-  const wanted = wishes();
-  describe(recording);
-  const picture = buildPicture(recording);
-  const { mechanism, stage } = picture;
-  const clock = new Clock(t[0], t.at(-1), () => update());
-  const seek = (time) => clock.seek(time);
-  const plots = new Plots(find(".plots"), t, seek, recording.marks);
-  const figures = drawFigures(recording, seek);
-  const keys = new Keys(find(".player"), find(".help"), !find(".report"));
-  const refreshBar = controlBar(find(".bar"), clock, keys, recording.marks);
-  plots.picker = channelPicker(
-    find(".picker"),
-    find(".pick"),
-    recording.channels,
-    recording.shown,
-    (channels, together) => plots.show(channels, together),
-  );
-  const modes = modeList(recording, clock, keys, () => update());
-  const { card, chosen } = choosing(picture, recording, plots, () => mechanism.arrows.frame);
-  const shown = new Shown(find(".menu"), find(".forces"), picture, () => (stage.dirty = true));
-  for (const name of wanted.show ?? recording.show) shown.set(name, true);
-  stage.grid.visible = Boolean(shown.state.grid);
-  shown.scale(wanted.arrows);
-  stage.resize(); // the legend of forces takes room
-  const update = () => {
-    const frame = mechanism.seek(clock.time);
-    for (const panel of [plots, ...figures]) panel.seek(clock.time, frame);
-    card.seek(frame);
-    refreshBar();
-    stage.dirty = true;
-  };
-  summary(find(".summary"), recording.notes);
-  themeSwitch(find(".theme"), wanted.theme, (theme) => {
-    for (const part of [mechanism, stage, plots, ...figures]) part.retheme(theme);
-  });
-  menu(find(".show"), find(".menu"));
-  viewButtons(stage, keys, chosen);
-  pictureKeys(keys, shown, chosen, find(".theme"));
-  find(".ask").addEventListener("click", () => keys.help());
-  reportButtons(stage);
-  if (VIEWS.includes(wanted.view) && !stage.planar) stage.look(wanted.view);
-  document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
-  modes?.open(wanted.mode);
-  update();
-  begin(clock, wanted);
-  if (wanted.select) chosen.select(mechanism.parts(wanted.select)[0] ?? null);
-  window.flyball = hooks(clock, picture, recording, shown, chosen, modes);
-  keepDrawing(clock, picture);
+  return new Player(readRecording(buffer));
+}
+
+export class Player {
+  /** The page with a recording; `replace` shows another one of the same mechanism. */
+  constructor(recording) {
+    const { t } = recording;
+    const wanted = wishes();
+    this.recording = recording;
+    describe(recording);
+    this.measures = measures(recording);
+    const picture = (this.picture = buildPicture(recording, this.measures));
+    const { stage } = picture;
+    const clock = (this.clock = new Clock(t[0], t.at(-1), () => this.update()));
+    clock.speed = recording.speed;
+    const seek = (time) => clock.seek(time);
+    const plots = (this.plots = new Plots(find(".plots"), t, seek, recording.marks));
+    this.figures = drawFigures(recording, seek);
+    const keys = new Keys(find(".player"), find(".help"), !find(".report"));
+    this.bar = controlBar(find(".bar"), clock, keys, recording.marks);
+    plots.picker = channelPicker(
+      find(".picker"),
+      find(".pick"),
+      recording.channels,
+      recording.shown,
+      (channels, together) => plots.show(channels, together),
+    );
+    this.modes = modeList(recording, clock, keys, this.bar, () => this.update());
+    Object.assign(this, choosing(picture, recording, plots, () => picture.mechanism.arrows.frame));
+    this.shown = new Shown(find(".menu"), find(".forces"), picture, () => (stage.dirty = true));
+    this.#switchOn(wanted.show ?? recording.show);
+    this.shown.scale(wanted.arrows);
+    stage.resize(); // the legend of forces takes room
+    summary(find(".summary"), recording.notes);
+    themeSwitch(find(".theme"), wanted.theme, (theme) => this.#retheme(theme));
+    this.#prepareControls(keys, wanted);
+    this.modes?.open(wanted.mode);
+    this.update();
+    begin(clock, wanted);
+    if (wanted.select) this.chosen.select(picture.mechanism.parts(wanted.select)[0] ?? null);
+    window.flyball = hooks(this);
+    keepDrawing(clock, picture);
+  }
+
+  #switchOn(names) {
+    for (const name of names) this.shown.set(name, true);
+    this.picture.stage.grid.visible = Boolean(this.shown.state.grid);
+  }
+
+  #retheme(theme) {
+    this.theme = theme;
+    const { mechanism, stage } = this.picture;
+    for (const part of [mechanism, stage, this.plots, ...this.figures]) part.retheme(theme);
+  }
+
+  #prepareControls(keys, wanted) {
+    const { stage } = this.picture;
+    menu(find(".show"), find(".menu"));
+    viewButtons(stage, keys, this.chosen);
+    pictureKeys(keys, this.shown, this.chosen, find(".theme"));
+    find(".ask").addEventListener("click", () => keys.help());
+    reportButtons(stage);
+    if (VIEWS.includes(wanted.view) && !stage.planar) stage.look(wanted.view);
+    document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
+  }
+
+  /** Bring everything to the time of the clock. */
+  update() {
+    const { picture, clock } = this;
+    const frame = picture.mechanism.seek(clock.time);
+    for (const panel of [this.plots, ...this.figures]) panel.seek(clock.time, frame);
+    this.card.seek(frame);
+    this.bar.refresh();
+    picture.stage.dirty = true;
+    this.onUpdate?.(clock.time);
+  }
+
+  /** Show another recording of the mechanism; camera, choices and switches stay, and the time as far as it can. */
+  replace(recording) {
+    const { picture, clock, shown } = this;
+    const before = picture.mechanism;
+    this.recording = recording;
+    describe(recording);
+    const now = measures(recording);
+    if (Math.max(now.unit / this.measures.unit, this.measures.unit / now.unit) > RESIZED) this.measures = now;
+    const mechanism = new Mechanism(recording, this.measures.unit, this.measures.extent);
+    picture.mechanism = mechanism;
+    picture.stage.replace(mechanism, () => motionPoints(recording, this.measures.unit));
+    picture.names = new Names(find(".names"), mechanism);
+    mechanism.retheme(this.theme);
+    const names = (m) => [...m.bodies, ...m.crowds, ...m.trails].map(({ name }) => name).join("\n");
+    if (names(before) === names(mechanism)) mechanism.showAs(before);
+    else this.list();
+    const on = Object.keys(shown.state).filter((name) => shown.state[name]);
+    shown.build();
+    this.#switchOn(on);
+    shown.scale(shown.factor);
+    clock.restrict(recording.t[0], recording.t.at(-1));
+    this.bar.mark(recording.marks);
+    this.plots.replace(recording.t, recording.marks, this.plots.picker.replace(recording.channels, recording.shown));
+    this.card.recording = recording;
+    const part = this.chosen.state.part && mechanism.parts(this.chosen.state.part.name)[0];
+    this.chosen.reselect(part ?? null);
+    summary(find(".summary"), recording.notes, false);
+    this.update();
+  }
+
+  /** Put other times in place of the recorded ones, or after them; the clock goes to the last one. */
+  extend(chunk, restart) {
+    const { recording, picture, clock, plots } = this;
+    extendRecording(recording, chunk, restart);
+    picture.mechanism.extended();
+    Object.assign(picture.stage, { points: null, findPoints: () => motionPoints(recording, this.measures.unit) });
+    if (restart) this.bar.mark([]);
+    plots.extend(recording.t);
+    clock.play(false);
+    clock.restrict(recording.t[0], recording.t.at(-1), recording.t.at(-1));
+  }
 }
 
 /** What a script on the page may ask for; tests do. */
-function hooks(clock, { mechanism, stage }, recording, shown, chosen, modes) {
+function hooks(player) {
+  const { clock, picture, shown, chosen, modes } = player;
+  const { stage } = picture;
   return {
     mode: () => modes?.name ?? null,
     begin: () => clock.begin,
@@ -334,15 +423,15 @@ function hooks(clock, { mechanism, stage }, recording, shown, chosen, modes) {
       clock.seek(time);
     },
     play: (on = true) => clock.play(on),
-    pose: () => mechanism.pose(),
-    poses: (set) => mechanism.crowds.find(({ name }) => name === set)?.poses() ?? [],
-    contacts: () => mechanism.arrows.touches?.list(mechanism.arrows.frame) ?? [],
+    pose: () => picture.mechanism.pose(),
+    poses: (set) => picture.mechanism.crowds.find(({ name }) => name === set)?.poses() ?? [],
+    contacts: () => picture.mechanism.arrows.touches?.list(picture.mechanism.arrows.frame) ?? [],
     drawn: () => stage.drawn,
     /** Milliseconds of script for one frame, the picture's commands included, over `n` frames through the motion. */
     effort(n = 60) {
-      const [from, to] = [recording.t[0], recording.t.at(-1)];
+      const [from, to] = [player.recording.t[0], player.recording.t.at(-1)];
       const start = performance.now();
-      for (let k = 0; k < n; k++) mechanism.seek(from + ((to - from) * k) / n);
+      for (let k = 0; k < n; k++) picture.mechanism.seek(from + ((to - from) * k) / n);
       const moved = performance.now();
       for (let k = 0; k < n; k++) {
         stage.dirty = true;
@@ -352,24 +441,24 @@ function hooks(clock, { mechanism, stage }, recording, shown, chosen, modes) {
     },
     time: () => clock.time,
     playing: () => clock.playing,
-    bodies: () => recording.bodies.map((body) => body.name),
+    bodies: () => player.recording.bodies.map((body) => body.name),
     pick: (x, y) => stage.pick(x, y)?.name ?? null,
     look: (view) => stage.look(view),
     webgl: () => Boolean(stage.renderer),
     show: (name, on = true) => shown.set(name, on),
     shown: () => Object.keys(shown.state).filter((name) => shown.state[name]),
-    arrows: () => mechanism.arrows.list(),
-    axes: () => mechanism.triads.list(),
-    select: (name) => chosen.select(mechanism.parts(name)[0] ?? null),
+    arrows: () => picture.mechanism.arrows.list(),
+    axes: () => picture.mechanism.triads.list(),
+    select: (name) => chosen.select(picture.mechanism.parts(name)[0] ?? null),
     selected: () => chosen.state.part?.name ?? null,
     paths: () =>
-      mechanism.trails.map(({ name, trail }) => ({ name, points: trail?.points.map((p) => p.toArray()) ?? [] })),
+      picture.mechanism.trails.map(({ name, trail }) => ({ name, points: trail?.points.map((p) => p.toArray()) ?? [] })),
     camera: () => ({ position: stage.camera.position.toArray(), target: stage.controls.target.toArray() }),
-    slack: () => mechanism.lines.filter(({ state }) => state?.slack).map(({ name }) => name),
+    slack: () => picture.mechanism.lines.filter(({ state }) => state?.slack).map(({ name }) => name),
     /** Where something on a body is in the picture [px]. */
     pixel(body, position = [0, 0, 0]) {
       const p = stage.camera.position.clone();
-      mechanism.place({ body, position }, p).project(stage.camera);
+      picture.mechanism.place({ body, position }, p).project(stage.camera);
       const [width, height] = stage.size;
       return [((p.x + 1) * width) / 2, ((1 - p.y) * height) / 2];
     },

@@ -130,7 +130,7 @@ export class Mechanism {
     for (const crowd of this.crowds) crowd.seek(frame);
     for (const line of this.lines) line.update(frame);
     for (const { trail } of [...this.bodies, ...this.trails]) trail?.seek();
-    this.arrows.seek(frame);
+    if (this.arrows.root.visible) this.arrows.seek(frame);
     this.triads.seek();
     return frame;
   }
@@ -166,6 +166,38 @@ export class Mechanism {
     body.trail ??= this.#trail(body.name, ORIGIN).trail;
     body.trail.root.visible = on;
     body.trail.seek();
+  }
+
+  /** The path of a requested point, on or off. */
+  showPath(index, on) {
+    const { trail } = this.trails[index];
+    if (trail) trail.root.visible = on;
+  }
+
+  /** Show what another mechanism of the same parts shows. */
+  showAs(other) {
+    other.bodies.forEach(({ shown, trail }, k) => {
+      this.show(k, shown);
+      if (trail?.root.visible) this.trace(k, true);
+    });
+    other.crowds.forEach(({ root }, k) => this.crowds[k].show(root.visible));
+    other.trails.forEach(({ trail }, k) => this.showPath(k, trail?.root.visible));
+  }
+
+  /** The recording has got other times: paths are drawn anew; forces are those of the earlier ones and disappear. */
+  extended() {
+    for (const crowd of this.crowds) crowd.extended();
+    for (const { trail } of [...this.bodies, ...this.trails]) if (trail?.root.visible) trail.redraw();
+    this.arrows.root.visible = false;
+  }
+
+  /** Give back what the graphics card holds. */
+  dispose() {
+    for (const root of [this.root, this.overlay])
+      root.traverse(({ geometry, material }) => {
+        geometry?.dispose();
+        for (const one of [material].flat()) one?.dispose();
+      });
   }
 
   /** Every part of a name that can be lit up: a joint may be drawn with two symbols. */

@@ -91,8 +91,11 @@ export class Modes {
   }
 }
 
-/** The speeds, in words that fit periods. */
-export function periodSpeeds(select, period) {
-  for (const option of select.options)
-    option.textContent = `${Number((period / Number(option.value)).toPrecision(2))} s/period`;
+/** Speeds in words that fit periods: how they are written, and read. */
+export function periodWords(period) {
+  return {
+    write: (speed) => `${Number((period / speed).toPrecision(2))} s/period`,
+    read: (text) => period / Number(/^\s*([\d.e+-]+)\s*(s|s\/period)?\s*$/i.exec(text)?.[1] ?? NaN),
+    hint: "seconds for a period",
+  };
 }

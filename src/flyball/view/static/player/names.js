@@ -27,6 +27,7 @@ export class Names {
     ].filter(({ name }) => !once.has(name) && once.add(name));
     this.mechanism = mechanism;
     this.box = box;
+    box.replaceChildren();
     this.parts = parts.slice(0, MOST).map((part) => {
       const label = element("span", { className: part.kind, textContent: part.name });
       box.append(label);

@@ -52,3 +52,21 @@ export function originsBox(data, picture) {
   });
   return [ends.map(([first]) => first), ends.map(([, last]) => last)];
 }
+
+/** The last `kept` pictures of a set, and of more of it; all in the steps of the first. */
+export function extendSet(set, more, restart, kept) {
+  if (!more) return;
+  unpacked(set);
+  const { grid, turned } = unpacked(more);
+  const width = 3 * set.count;
+  const place = (value, k) => {
+    const c = Math.floor((k % width) / set.count);
+    return value ? (more.low[c] + more.step * value - set.low[c]) / set.step : 0;
+  };
+  const tail = (old, other, kind) => {
+    const all = restart ? other : kind.from([...old, ...other]);
+    return all.subarray(Math.max(all.length - width * kept, 0));
+  };
+  set.grid = tail(set.grid, Float64Array.from(grid, place), Float64Array);
+  set.turned = tail(set.turned, turned, Int16Array);
+}

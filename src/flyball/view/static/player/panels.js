@@ -5,7 +5,8 @@ const MOST = 300; // channels listed at once
 const ENOUGH = 600; // px: in a lower panel the summary is closed, for the plots
 
 /** The list of channels: search, tick, and whether those of one unit share a plot. */
-export function channelPicker(panel, button, channels, shown, onChange) {
+export function channelPicker(panel, button, known, shown, onChange) {
+  let channels = known;
   const chosen = new Set(channels.filter((channel) => shown.includes(channel.name)));
   const search = panel.querySelector("input[type=search]");
   const together = panel.querySelector("input[name=together]");
@@ -50,6 +51,7 @@ export function channelPicker(panel, button, channels, shown, onChange) {
     panel.hidden = !on;
     button.setAttribute("aria-expanded", String(on));
     if (on) {
+      panel.style.setProperty("--under", `${button.offsetTop + button.offsetHeight + 6}px`);
       fill();
       search.focus();
     }
@@ -74,6 +76,16 @@ export function channelPicker(panel, button, channels, shown, onChange) {
   report();
   return {
     has: (channel) => chosen.has(channel),
+    /** Offer other channels; those of the same names are chosen. Returns the chosen ones, and whether they share plots. */
+    replace(others, usual) {
+      const names = new Set([...chosen].map(({ name }) => name));
+      channels = others;
+      chosen.clear();
+      for (const channel of channels) if (names.has(channel.name)) chosen.add(channel);
+      if (names.size && !chosen.size) for (const channel of channels) if (usual.includes(channel.name)) chosen.add(channel);
+      if (!panel.hidden) fill();
+      return [channels.filter((channel) => chosen.has(channel)), together.checked];
+    },
     toggle(channel) {
       if (!chosen.delete(channel)) chosen.add(channel);
       if (!panel.hidden) fill();
@@ -151,14 +163,14 @@ export function bodyLegend(
     item.addEventListener("pointerleave", () => onPoint(index, false));
     return item;
   });
-  const paths = trails.map(({ name, colour, trail }) => {
+  const paths = trails.map(({ name, colour }, index) => {
     const text = element("span", { className: "name", textContent: name });
     const label = element("span", { className: "body" }, swatch(colour, "swatch line"), text);
     return element(
       "li",
       {},
       label,
-      switchButton("eye", `Show the path ${name}`, true, (on) => onPath(trail, on), eye()),
+      switchButton("eye", `Show the path ${name}`, true, (on) => onPath(index, on), eye()),
     );
   });
   const sets = crowds.map(({ name, colour, count }, index) => {
@@ -171,26 +183,29 @@ export function bodyLegend(
       switchButton("eye", `Show ${name}`, true, (on) => onSet(index, on), eye()),
     );
   });
-  box.append(...rows, ...sets, ...paths);
+  box.replaceChildren(...rows, ...sets, ...paths);
   toggle.querySelector("span").textContent = bodyCount({ bodies, sets: crowds });
   const open = (on) => {
     box.hidden = !on;
     toggle.setAttribute("aria-expanded", String(on));
   };
-  toggle.addEventListener("click", () => open(box.hidden));
+  toggle.onclick = () => open(box.hidden);
   return { open, mark: (name) => rows.forEach((row, k) => row.classList.toggle("selected", bodies[k].name === name)) };
 }
 
 const unbroken = (text) => text.replace(/(\d)e-(\d)/g, "$1e\u2011$2"); // a number stays on one line
 
 /** The summary notes as a list of terms. */
-export function summary(details, notes) {
+export function summary(details, notes, first = true) {
   const entries = Object.entries(notes);
   details.hidden = !entries.length;
-  details.open = details.parentElement.clientHeight >= ENOUGH || document.body.matches(".plotless:not(.has-modes)");
+  const live = Boolean(document.querySelector(".live"));
+  if (first)
+    details.open =
+      !live && (details.parentElement.clientHeight >= ENOUGH || document.body.matches(".plotless:not(.has-modes)"));
   details
     .querySelector("dl")
-    .append(
+    .replaceChildren(
       ...entries.map(([term, text]) =>
         element("div", {}, element("dt", { textContent: term }), element("dd", { textContent: unbroken(text) })),
       ),

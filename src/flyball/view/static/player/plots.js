@@ -1,6 +1,6 @@
 // Plots of channels over time, with one time cursor through all of them; pointing at a time goes there.
 import uPlot from "uplot";
-import { mixed } from "./data.js";
+import { frameAt, mixed } from "./data.js";
 import { element, pretty, shortNumber } from "./format.js";
 import { Marks } from "./marks.js";
 import { CURVES } from "./theme.js";
@@ -101,10 +101,20 @@ export function hidden(channels) {
   return channels.map((channel, k) => channels.slice(0, k).filter((other) => same(channel, other)).length);
 }
 
+/** A channel of another motion at these times; nothing beyond that motion. */
+function valuesAt(motion, { name, unit }, times) {
+  const values = motion.values.get(`${name} ${unit}`);
+  const [first, last] = [motion.times[0], motion.times.at(-1)];
+  return Array.from(times, (t) => {
+    const value = values && t >= first && t <= last ? mixed(values, frameAt(motion.times, t)) : null;
+    return Number.isFinite(value) ? value : null;
+  });
+}
+
 export class Plot {
   /** One plot with its own head line, cursor and markers; `title` says what its axis shows, `marks` are drawn over it. */
-  constructor(parent, channels, times, onSeek, title, marks) {
-    Object.assign(this, { channels, times, marks, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
+  constructor(parent, channels, times, onSeek, title, marks, motions = []) {
+    Object.assign(this, { channels, times, marks, motions, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
     this.values = channels.map(() => element("output", { className: "value" }));
     const names = channels.map((channel, k) => {
       const swatch = element("span", { className: "swatch" });
@@ -123,9 +133,16 @@ export class Plot {
     const label = `Plot of ${channels.map((channel) => channel.name).join(", ")} over time`;
     this.root = element("figure", { className: "plot", aria: { role: "group", label } }, head, this.box);
     parent.append(this.root);
-    this.chart = new uPlot(this.#options(), [times, ...channels.map((channel) => gapped(channel.values))], this.box);
+    this.chart = new uPlot(this.#options(), this.#data(), this.box);
     this.#addCursor(onSeek);
     marks.listen(this.chart, this.box);
+  }
+
+  #data() {
+    const { channels, times } = this;
+    const own = channels.map(({ values }) => gapped(values));
+    const others = this.motions.flatMap((motion) => channels.map((channel) => valuesAt(motion, channel, times)));
+    return [times, ...own, ...others];
   }
 
   #options() {
@@ -161,6 +178,7 @@ export class Plot {
           pxAlign: 0,
           points: { show: this.times.length === 1 },
         })),
+        ...this.motions.flatMap(({ colour }) => this.channels.map(() => ({ stroke: colour, width: 1.2, pxAlign: 0, points: { show: false } }))),
       ],
     };
   }
@@ -184,6 +202,12 @@ export class Plot {
       seek(event);
     });
     over.addEventListener("pointermove", (event) => over.hasPointerCapture(event.pointerId) && seek(event));
+  }
+
+  /** Other values of the same channels, at these times. */
+  redraw(channels, times) {
+    Object.assign(this, { channels, times });
+    this.chart.setData(this.#data());
   }
 
   resize(width, height) {
@@ -212,20 +236,48 @@ export class Plot {
 export class Plots {
   /** All plots in an element; `onSeek(time)` is called when the user points at a time. */
   constructor(box, times, onSeek, marks = []) {
-    Object.assign(this, { box, times, onSeek, marks, plots: [], last: null });
+    Object.assign(this, { box, times, onSeek, marks, plots: [], last: null, motions: [] });
     this.empty = element("p", { className: "empty", textContent: "No channel is shown. Choose some above." });
     new ResizeObserver(() => this.resize()).observe(box);
   }
 
+  /** Draw the curves of other motions too, each motion in one colour: its times, and values by name and unit. */
+  overlay(motions) {
+    this.motions = motions;
+    this.show(...this.asked);
+  }
+
   /** Show these channels and no others. */
   show(channels, together) {
+    this.asked = [channels, together];
     const groups = grouped(channels, together);
     for (const plot of this.plots) plot.destroy();
     const marks = (k) => new Marks(this.marks, k === 0 ? LANES : 0);
-    this.plots = groups.map((group, k) => new Plot(this.box, group, this.times, this.onSeek, "", marks(k)));
+    this.plots = groups.map((group, k) => new Plot(this.box, group, this.times, this.onSeek, "", marks(k), this.motions));
     if (groups.length) this.empty.remove();
     else this.box.append(this.empty);
     this.resize();
+  }
+
+  /** Show the channels of another recording, as `show` does. */
+  replace(times, marks, [channels, together]) {
+    Object.assign(this, { times, marks, asked: [channels, together] });
+    const named = new Map(channels.map((channel) => [channel.name, channel]));
+    const there = this.plots.flatMap(({ channels: own }) => own.map(({ name }) => name));
+    if (there.length !== channels.length || there.some((name) => !named.has(name))) return this.show(channels, together);
+    for (const plot of this.plots) {
+      plot.marks.marks = marks;
+      plot.redraw(plot.channels.map(({ name }) => named.get(name)), times);
+    }
+  }
+
+  /** The channels have got other values, at these times; marks were those of the earlier ones. */
+  extend(times) {
+    Object.assign(this, { times, marks: [] });
+    for (const plot of this.plots) {
+      plot.marks.marks = [];
+      plot.redraw(plot.channels, times);
+    }
   }
 
   resize() {

@@ -19,7 +19,17 @@ export const LABELS = {
 export class Shown {
   /** Switches in a menu; `targets` are the mechanism, the stage and the names, `onChange` is called after a switch. */
   constructor(menu, legend, targets, onChange) {
-    Object.assign(this, { menu, legend, targets, onChange, state: {} });
+    Object.assign(this, { menu, legend, targets, onChange, state: {}, factor: 1 });
+    this.size = menu.querySelector("[name=arrow-size]");
+    this.size.addEventListener("input", () => this.scale(10 ** Number(this.size.value)));
+    this.build();
+  }
+
+  /** The switches for what the mechanism has; all are off. */
+  build() {
+    const { menu, targets } = this;
+    for (const box of menu.querySelectorAll("label:has([type=checkbox])")) box.remove();
+    this.state = {};
     const present = new Set(targets.mechanism.recording.arrows.map(({ group }) => `${group}s`));
     if (targets.mechanism.arrows.touches) present.add("contacts");
     const moments = targets.mechanism.recording.arrows.some(({ what }) => what === "moment");
@@ -34,8 +44,6 @@ export class Shown {
       menu.querySelector(home).append(element("label", {}, box, ` ${LABELS[name]}`));
     }
     menu.querySelector(".forces-part").hidden = !this.names.some((name) => ARROWS[name]);
-    this.size = menu.querySelector("[name=arrow-size]");
-    this.size.addEventListener("input", () => this.scale(10 ** Number(this.size.value)));
   }
 
   set(name, on) {
@@ -58,6 +66,7 @@ export class Shown {
 
   /** Make arrows longer or shorter. */
   scale(factor) {
+    this.factor = factor;
     this.targets.mechanism.arrows.rescale(factor);
     this.size.value = Math.log10(factor);
     this.#explain();

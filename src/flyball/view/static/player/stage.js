@@ -93,6 +93,16 @@ export class Stage {
     controls.addEventListener("change", () => (this.dirty = true));
   }
 
+  /** Show another mechanism in place of this one, from where one looks; `findPoints` is called when they are needed. */
+  replace(mechanism, findPoints) {
+    this.retired ??= [];
+    this.retired.push(this.mechanism);
+    for (const part of [this.mechanism.root, this.mechanism.overlay]) part.removeFromParent();
+    Object.assign(this, { mechanism, points: null, findPoints, dirty: true });
+    this.scene.add(mechanism.root);
+    this.top.add(mechanism.overlay);
+  }
+
   get size() {
     return [Math.max(this.element.clientWidth, 1), Math.max(this.element.clientHeight, 1)];
   }
@@ -120,6 +130,7 @@ export class Stage {
 
   /** Look from a preset, or from where one looks ("fit"); all of the motion is in the picture. */
   look(view, smooth = false) {
+    this.points ??= this.findPoints();
     this.view = view;
     this.followed = null;
     const [width, height] = this.size;
@@ -240,7 +251,18 @@ export class Stage {
     this.renderer.autoClear = false;
     this.renderer.clearDepth();
     this.renderer.render(this.top, this.camera);
+    for (const old of this.retired?.splice(0) ?? []) old.dispose(); // after a picture of the new one, which shares shaders
     return true;
+  }
+
+  /** The point of the world under a point of the element: in the plane, or as far away as another point. */
+  pointAt(x, y, beside) {
+    const [width, height] = this.size;
+    const near = new THREE.Vector3((2 * x) / width - 1, 1 - (2 * y) / height, -1).unproject(this.camera);
+    if (this.planar) return near.setZ(0);
+    const sight = this.camera.getWorldDirection(new THREE.Vector3());
+    const ray = near.sub(this.camera.position);
+    return ray.multiplyScalar(beside.clone().sub(this.camera.position).dot(sight) / ray.dot(sight)).add(this.camera.position);
   }
 
   /** The part under a point of the element (pixels from its corner), or null. */

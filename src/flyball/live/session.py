@@ -1,0 +1,445 @@
+"""One open live page: parameters, the run shown, stepping and dragging. Messages in, messages out; no network.
+
+A message to the page is a JSON object, and with it a packed recording where there is something to show (`encode`). A
+message from the page is a JSON object whose ``do`` says what to do:
+
+========================= =============================================================================
+``set``                   move the slider ``name`` to ``value``, in its unit
+``start``, ``pause``      step on and on, or stop stepping
+``step``, ``reset``       one step; back to the described start
+``speed``                 seconds of motion in a second, ``value``
+``drag``                  pull the point ``at`` of ``body`` [m, in its frame] to the point ``to`` [m, world], ``by``
+                          ``assembly`` (the mechanism follows, closed) or ``force`` (a spring, while stepping); ``t``
+                          is the time shown
+``release``               let go
+``shown``                 the last picture of stepping is drawn: the next one may come
+========================= =============================================================================
+
+Only the newest of values and points waits to be worked on: a page that sends faster than runs take skips some.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import struct
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlyballError, ModelError, SimulationError
+from ..model.model import Model
+from ..results.result import Result
+from ..view.animation import record_motion
+from ..view.page import pack_recording
+from ..view.recording import Recording
+from .dragging import AssemblyDrag, DragTarget
+from .options import LiveOptions, Slider, make_sliders
+from .stepping import LiveStepping
+
+MOST_AT_ONCE = 1000
+"""Messages taken before work goes on: a page that never pauses does not stop it."""
+MOST_REFUSED = 50
+"""Messages that make no sense before a page is closed."""
+SLOW_RUN = 1.0
+"""Duration of a run [s] from which the page says how slow it is."""
+LOOK_AT_FILE = 0.3
+"""Interval between two looks at the model file [s]."""
+PICTURE = 1.0 / 30.0
+"""Interval between two pictures while stepping [s]."""
+KNOWN_ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
+"""Energies that positions and velocities determine."""
+
+
+class ClosedPage(Exception):
+    """The page has been closed."""
+
+
+class SupersededRun(Exception):
+    """A run is ended because a newer value is waiting."""
+
+
+def encode(kind: str, content: Mapping[str, Any], recording: Recording | None = None) -> bytes:
+    """Return a message to the page: length of a JSON object (uint32, little-endian), the object, a packed recording."""
+    text = json.dumps({"kind": kind, **content}, allow_nan=False).encode()
+    return struct.pack("<I", len(text)) + text + (b"" if recording is None else pack_recording(recording))
+
+
+class LiveSession:
+    """The state behind one page.
+
+    Parameters
+    ----------
+    load : callable
+        Returns the model; called again when its file has changed.
+    o : LiveOptions
+    file : Path, optional
+        The model's file, which is watched.
+    wording : callable
+        Converts the text of an error to that of the terminal.
+
+    Attributes
+    ----------
+    sliders : dict of str to Slider
+        Parameters that can be moved, with their present values; empty until `work` has loaded the model.
+    """
+
+    def __init__(
+        self,
+        load: Callable[[], Model],
+        o: LiveOptions,
+        file: Path | None = None,
+        wording: Callable[[str], str] = str,
+    ) -> None:
+        self._load, self._options, self._file, self._wording = load, o, file, wording
+        self._changed, self._looked = _time_of_change(file), time.monotonic()
+        self.sliders: dict[str, Slider] = {}
+        self._result: Result | None = None
+        self._stepping: LiveStepping | None = None
+        self._drag: AssemblyDrag | None = None
+        self._target: DragTarget | None = None
+        self._due: list[str] = ["model", "run"]  # what is to be done, in this order
+        self._playing, self._speed, self._single = False, 1.0, 0
+        self._model: Model | None = None
+        self._drag_began, self._drawing, self._refused = 0.0, False, 0
+        self._commands: dict[str, Callable[[Mapping[str, Any]], None]] = {
+            "set": self._set,
+            "start": self._start,
+            "pause": self._pause,
+            "step": self._step,
+            "reset": self._reset,
+            "speed": self._set_speed,
+            "drag": self._drag_to,
+            "release": self._release,
+            "shown": self._picture_shown,
+        }
+
+    # ---- messages from the page
+
+    def receive(self, text: str | bytes) -> None:
+        """Take a message of the page; it is worked on by `work`.
+
+        Raises
+        ------
+        ModelError
+            If it is no such message.
+        """
+        try:
+            message = json.loads(text)
+        except (ValueError, RecursionError):
+            raise ModelError("a message of the page is not JSON; reload the page") from None
+        command = self._commands.get(str(message.get("do"))) if isinstance(message, dict) else None
+        if command is None:
+            known = ", ".join(self._commands)
+            raise ModelError(f"a message of the page asks for none of {known}; reload the page")
+        command(message)
+
+    def _set(self, message: Mapping[str, Any]) -> None:
+        name = message.get("name")
+        if not isinstance(name, str) or name not in self.sliders:
+            raise ModelError(f"there is no parameter {str(name)[:80]!r} to move")
+        self.sliders[name] = self.sliders[name].moved(message.get("value"))
+        self._drag = self._target = None
+        if self._stepping is not None and self._stepping.accepts(name):
+            return
+        self._ask("run")
+
+    def _start(self, message: Mapping[str, Any]) -> None:
+        self._playing, self._drag, self._drawing = True, None, False
+        self._ask("stepper")
+
+    def _pause(self, message: Mapping[str, Any]) -> None:
+        self._playing = False
+
+    def _step(self, message: Mapping[str, Any]) -> None:
+        self._playing, self._single, self._drag = False, 1, None
+        self._ask("stepper")
+
+    def _reset(self, message: Mapping[str, Any]) -> None:
+        self._playing, self._single = False, 0
+        self._stepping = self._drag = self._target = None
+        self._ask("run")
+
+    def _set_speed(self, message: Mapping[str, Any]) -> None:
+        self._speed = _positive(message.get("value"), "speed")
+        if self._stepping is not None:
+            self._stepping.begin_pace()
+
+    def _drag_to(self, message: Mapping[str, Any]) -> None:
+        target = DragTarget.from_message(message, self._model)
+        if target.by_force != (self._stepping is not None):
+            if target.by_force:
+                raise ModelError("a body is pulled by a force while the mechanism is stepped: start it first")
+            self._playing, self._single = False, 0
+        self._target = target
+
+    def _release(self, message: Mapping[str, Any]) -> None:
+        self._target = None
+
+    def _picture_shown(self, message: Mapping[str, Any]) -> None:
+        self._drawing = False
+
+    def _ask(self, what: str) -> None:
+        if what not in self._due:
+            self._due.append(what)
+
+    def refusal(self, error: FlyballError) -> bytes:
+        """Return the answer to a message that was refused.
+
+        Raises
+        ------
+        ClosedPage
+            If it was one of too many.
+        """
+        self._refused += 1
+        if self._refused > MOST_REFUSED:
+            raise ClosedPage("too many messages that make no sense")
+        return encode("error", {"text": self._wording(str(error))})
+
+    # ---- work
+
+    def wait(self) -> float | None:
+        """Return how long to wait for a message until there is work [s]; None: until a message arrives."""
+        if self._due or self._single or (self._target is not None and not self._target.by_force):
+            return 0.0
+        if self._playing and self._stepping is not None and not self._drawing:
+            return max(0.0, self._stepping.shown + PICTURE - time.monotonic())
+        return None if self._file is None else LOOK_AT_FILE
+
+    def work(self, poll: Callable[[], None] = lambda: None) -> Iterator[bytes]:
+        """Do what is due, and yield messages to the page.
+
+        Parameters
+        ----------
+        poll : callable
+            Called during a run; it takes waiting messages by `receive`. A newer value ends the run.
+        """
+        self._look_at_file()
+        while self._due:
+            what = self._due.pop(0)
+            yield from self._guarded({"model": self._describe, "run": self._run, "stepper": self._begin}[what], poll)
+        if self._target is not None and not self._target.by_force:
+            yield from self._guarded(self._assemble, poll)
+        elif self._stepping is not None and (self._single or (self._playing and not self._drawing)):
+            yield from self._guarded(self._advance, poll)
+
+    def _guarded(self, work: Callable[..., Iterator[bytes]], poll: Callable[[], None]) -> Iterator[bytes]:
+        """Do work; an error goes to the page, in the words of the terminal."""
+        try:
+            yield from work(poll)
+        except SupersededRun:
+            pass
+        except FlyballError as error:
+            self._playing, self._single, self._target = False, 0, None
+            yield encode("error", {"text": self._wording(str(error))})
+
+    def _look_at_file(self) -> None:
+        now = time.monotonic()
+        if self._file is None or now - self._looked < LOOK_AT_FILE:
+            return
+        self._looked = now
+        changed = _time_of_change(self._file)
+        if changed is not None and changed != self._changed:
+            self._changed = changed
+            self._due = ["model", "run"]
+
+    def _describe(self, poll: Callable[[], None]) -> Iterator[bytes]:
+        """Load the model; sliders whose written value is the same keep their place."""
+        self._playing, self._single = False, 0
+        self._stepping = self._drag = self._target = None
+        try:
+            model = self._load()
+            new = make_sliders(model, self._options.ranges)
+        except FlyballError:
+            self._due = []
+            raise
+        before = self._model.parameters if self._model is not None else {}
+        for name, slider in new.items():
+            old = self.sliders.get(name)
+            if old is not None and before.get(name) == model.parameters[name]:
+                new[name] = dataclasses.replace(slider, value=old.value)
+        self._model, self.sliders = model, new
+        yield encode(
+            "model",
+            {
+                "name": model.name,
+                "planar": model.planar,
+                "watched": self._file is not None,
+                "sliders": [dataclasses.asdict(x) for x in new.values()],
+            },
+        )
+
+    def _parameters(self) -> dict[str, float | str]:
+        return {name: x.quantity for name, x in self.sliders.items()}
+
+    def _known_model(self) -> Model:
+        if self._model is None:
+            raise ModelError("the model could not be read; correct it, and reload the page")
+        return self._model
+
+    def _run(self, poll: Callable[[], None]) -> Iterator[bytes]:
+        """Simulate with the present values of the sliders, and show the motion; stepping begins again."""
+        model, o = self._known_model(), self._options
+        values = {name: x.value for name, x in self.sliders.items()}
+        self._stepping = self._drag = self._target = None
+        yield encode("busy", {"text": "computing"})
+        began, error = time.perf_counter(), None
+
+        def report(fraction: float) -> None:
+            poll()
+            if "run" in self._due:
+                raise SupersededRun
+
+        try:
+            result = model.simulate(o.t_end, outputs=o.outputs, parameters=self._parameters(), progress=report)  # type: ignore[attr-defined]
+        except SimulationError as stopped:
+            if not isinstance(stopped.result, Result) or len(stopped.result.t) < 2:
+                raise
+            result, error = stopped.result, stopped
+        seconds = time.perf_counter() - began - result.health.compiling
+        self._result = result
+        recording = record_motion(result)
+        span = float(result.t[-1] - result.t[0])
+        content = {"values": values, "seconds": seconds, "slow": slow_remark(seconds, span)}
+        yield encode("run", content, recording)
+        if error is not None:
+            yield encode("error", {"text": self._wording(str(error))})
+        if self._playing:
+            self._ask("stepper")
+
+    def _begin(self, poll: Callable[[], None]) -> Iterator[bytes]:
+        """Make the stepper, unless there is one."""
+        if self._stepping is None:
+            model = self._known_model()
+            if self._result is None:
+                raise ModelError(f"{model.name!r} has no motion yet: nothing can be stepped")
+            speed = record_motion(self._result, curves=False).speed
+            self._stepping = LiveStepping(model, self.sliders, speed * PICTURE / 2.0)
+            self._target = None
+            yield self._motion([self._stepping.sample()], True)
+        self._stepping.begin_pace()
+        yield encode("stepping", {"dt": self._stepping.dt, "method": self._stepping.method})
+
+    def _advance(self, poll: Callable[[], None]) -> Iterator[bytes]:
+        """Take the steps that are due, and show them."""
+        x = self._stepping
+        assert x is not None
+        try:
+            samples = x.advance(self.sliders, self._target, None if self._playing else self._single, self._speed)
+        finally:
+            self._single = 0
+        if samples:
+            self._drawing = True
+            yield self._motion(samples, False, x.slow_remark())
+
+    def _motion(self, samples: list[Any], restart: bool, slow: str = "") -> bytes:
+        assert self._stepping is not None
+        recording = self._trimmed(record_motion(self._stepping.motion(samples), with_notes=False))
+        return encode("motion", {"restart": restart, "slow": slow}, recording)
+
+    def _assemble(self, poll: Callable[[], None]) -> Iterator[bytes]:
+        """Move the mechanism so that the dragged point follows, and show it."""
+        target = self._target
+        assert target is not None
+        restart = self._drag is None
+        if self._drag is None:
+            self._drag = AssemblyDrag(self._known_model(), self._parameters(), *self._shown(target.t))
+            self._stepping, self._drag_began = None, time.monotonic()
+        recording = self._trimmed(record_motion(self._drag.move(target), with_notes=False))
+        self._target = None
+        recording = dataclasses.replace(recording, t=np.array([time.monotonic() - self._drag_began]))
+        yield encode("motion", {"restart": restart, "slow": "", "closure": self._drag.closure}, recording)
+
+    def _shown(self, t: float) -> tuple[Result, int]:
+        """Return the motion on the page, and the number of the output time nearest to t."""
+        if self._stepping is not None:
+            return self._stepping.motion([self._stepping.sample()]), 0
+        if self._result is None:
+            raise ModelError("there is no position yet from which a body could be dragged")
+        return self._result, int(np.argmin(np.abs(self._result.t - t)))
+
+    def _trimmed(self, recording: Recording) -> Recording:
+        """Return a recording with what the page does not have yet, and nothing that states do not determine."""
+        model = self._known_model()
+
+        def known(name: str) -> bool:
+            owner, _, what = name.partition(".")
+            return name in KNOWN_ENERGIES or (owner in model.by_name and not what.startswith("contact_"))
+
+        return dataclasses.replace(
+            recording,
+            bodies=tuple(dataclasses.replace(b, shapes=()) for b in recording.bodies),
+            lines=tuple(x for x in recording.lines if x.name in model.by_name),
+            channels=tuple(c for c in recording.channels if known(c.name)),
+            joints=(),
+            curves=(),
+            frames=(),
+            arrows=(),
+        )
+
+
+def converse(
+    session: LiveSession, receive: Callable[[float | None], str | bytes], send: Callable[[bytes], None]
+) -> None:
+    """Pass messages between a page and its session until the page is closed.
+
+    Parameters
+    ----------
+    session : LiveSession
+    receive : callable
+        Returns the next message of the page, waiting for this time [s] at most (None: until there is one); it raises
+        TimeoutError if there is none, and ClosedPage if the page is closed.
+    send : callable
+        Sends a message to the page; it raises ClosedPage if the page is closed.
+
+    Raises
+    ------
+    ClosedPage
+        In the end.
+    """
+
+    def take(timeout: float | None) -> None:
+        """Take all messages that wait, after waiting for the first."""
+        with suppress(TimeoutError):
+            for _ in range(MOST_AT_ONCE):
+                text = receive(timeout)
+                timeout = 0.0
+                try:
+                    session.receive(text)
+                except FlyballError as error:
+                    send(session.refusal(error))
+
+    while True:
+        take(session.wait())
+        for message in session.work(lambda: take(0.0)):
+            send(message)
+
+
+def slow_remark(seconds: float, span: float) -> str:
+    """Say how slow a computation is; nothing if it is quick."""
+    if seconds < SLOW_RUN or span <= 0.0:
+        return ""
+    return f"slow: {seconds / span:.2g} s of computing for 1 s of motion"
+
+
+def _positive(value: Any, what: str) -> float:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not 0.0 < value < 1e9
+        or not math.isfinite(value)
+    ):
+        raise ModelError(f"{what} is {str(value)[:40]}; it must be a finite number greater than 0")
+    return float(value)
+
+
+def _time_of_change(file: Path | None) -> int | None:
+    try:
+        return None if file is None else file.stat().st_mtime_ns
+    except OSError:  # an editor may replace the file
+        return None
