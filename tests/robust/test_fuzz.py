@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from fuzzing import content, physics, poses, relations, scenes, touching, verdicts
 
 import flyball as fb
-from flyball.results.diagnostics import energy_moved
+from flyball.results.energy_balance import energy_moved
 
 from . import verdict
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import flyball as fb
-from flyball.results.diagnostics import energy_moved
+from flyball.results.energy_balance import energy_moved
 from flyball.results.result import Result
 
 from .bounds import against

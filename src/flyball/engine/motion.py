@@ -39,7 +39,7 @@ from .loads import (
     update_loads,
     update_readings,
 )
-from .rows import BY_TIME, controller_column, count_measured, direction_column, row_times, update_controllers
+from .rows import BY_TIME, controller_column, count_measured, direction_column, update_controllers
 from .solve import MAX_REFINEMENTS, exchange_coordinates, factor, reuse_factor, solve
 from .stabilization import (
     BAUMGARTE,
@@ -51,6 +51,7 @@ from .stabilization import (
     STEPS,
     TIGHT_G,
     TIGHT_V,
+    add_baumgarte_terms,
     position_rounding,
     position_violation,
     project_state,
@@ -204,10 +205,7 @@ def accelerate(S, W, t, p, dy, factored):
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
     if W.options.stabilization == BAUMGARTE:
-        a = 2.0 * W.options.alpha
-        b = W.options.beta * W.options.beta
-        for k in range(S.rows.law.shape[0]):
-            W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
+        add_baumgarte_terms(S, W, v)
     if W.options.partitioned > 0.0:  # from here on with all masses
         W.options.partitioned = 0.0
         factored = FACTOR_OLD

@@ -240,6 +240,18 @@ def project_velocities(S, W, v, tol_v, factored):
 
 
 @formula
+def add_baumgarte_terms(S, W, v):
+    """Add feedback of the violations: G vdot = gamma - 2 alpha (G v - nu) - beta^2 g.
+
+    Baumgarte 1972, *Computer Methods in Applied Mechanics and Engineering* 1, 1-16.
+    """
+    a = 2.0 * W.options.alpha
+    b = W.options.beta * W.options.beta
+    for k in range(S.rows.law.shape[0]):
+        W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
+
+
+@formula
 def project_error(y, e, S, W):
     """Remove the part of an error e that the projection of the state y removes; W was last evaluated at y.
 

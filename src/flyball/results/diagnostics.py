@@ -1,4 +1,4 @@
-"""Diagnostics of a motion: energy balance, acceleration defects, orientation errors, creep, pulling contacts.
+"""Diagnostics of a motion: acceleration defects, orientation errors, creep, pulling contacts.
 
 Each check returns a text with a remedy, or nothing for a sound motion.
 
@@ -15,14 +15,13 @@ defect.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..constraints.inclination import KIND_PITCH
-from ..engine.entry_point import characteristic_rate_within
 from ..engine.kinematics import quaternion_at
 from ..engine.loads import force_row
 from ..math.vec import mm, transpose
@@ -32,7 +31,13 @@ from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 from ..numerics.integrators.radau_stages import RADAU_A as RADAU
 from ..tables.law_inputs import forces_in_events
 from ..tables.structure_definition import velocity_names
-from .energy_balance import EnergyBudget, budgets_by_part, lag_warning
+from .energy_balance import (
+    MAX_ACCELERATION_VIOLATION,
+    MAX_IMBALANCE,
+    balance_warning,
+    energy_moved,
+    lag_warning,
+)
 from .motion_record import coordinate_records, measured_coordinate
 
 if TYPE_CHECKING:
@@ -312,31 +317,11 @@ def _parabola_rate(t: np.ndarray, v: np.ndarray, rows: np.ndarray, k: int) -> np
     return (slopes[0] * after + slopes[1] * before) / (before + after)
 
 
-DEFAULT_IMBALANCE = 1e-4  # relative to the energy moved: larger imbalances are reported if no tolerance was given
-RTOL_FACTOR, RTOL_FACTOR_PER_STEP = (
-    10.0,
-    0.1,
-)  # times rtol: accepted imbalance of a short motion; it grows with each step
-FINE_RTOL_FACTOR = 3e-2  # times the root of rtol: the same for rtol so small that a digit more or less does not matter
-MAX_IMBALANCE, ROUGH_RTOL_FACTOR = (
-    1e-2,
-    5.0,
-)  # relative to the energy moved: limit for any number of steps; or so many times a large rtol
-MAX_ROUGH_IMBALANCE = 2e-2  # relative to the energy moved: limit for any tolerance
 DISSIPATED_PART = (
     0.1  # relative to the dissipation of impacts and friction: smaller numerical losses hardly change a motion
 )
 LIFTING_PART = 1e-6  # relative to the energy that lifts all bodies by one's size: possible residuals of solves at rest
-MAX_INTERVALS, MIN_OUTPUTS_PER_INTERVAL = (
-    64,
-    4,
-)  # largest number of intervals for the balance, and least number of output rows in each
-SEEN_PART = 0.1  # part of the energy estimated from accelerations; if the rows show less, they miss the motion
 MAX_VIOLATION = 1e-6  # relative to the mechanism's length: larger constraint violations are reported
-MAX_ACCELERATION_VIOLATION = (
-    1e-8  # relative acceleration error of constraints: reactions are wrong by up to 1e4 times it
-)
-REST_SPEED = 1e-7  # speed that counts as rest, relative to the mechanism's length times its characteristic rate
 MIN_CREEP = 1e-3  # relative to the mechanism's length: larger creep is reported
 
 
@@ -378,7 +363,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
 
 def doubt_messages(result: Result) -> tuple[str, ...]:
     """Return reasons why a motion may not satisfy its tolerance; none for a sound motion."""
-    balance = _balance_warning(result.budget) or lag_warning(result.budget)
+    balance = balance_warning(result.budget) or lag_warning(result.budget)
     return tuple(
         text
         for text in (
@@ -446,143 +431,6 @@ def _rotation_per_step(result: Result) -> tuple[str, ...]:
         f"{name} turns by up to {turns[name]:.2g} rad in a step, and by up to {lost:.2g} per cent too little: "
         f"take shorter steps, method=fb.Stepping(step={step * MAX_ROTATION / turns[name]:.1g})",
     )
-
-
-def expected_imbalance(result: Result) -> float:
-    """Return the energy imbalance to be expected of a sound motion, relative to the energy moved.
-
-    Errors of steps accumulate: a motion of few steps is accurate to a few times its tolerance, one of ten thousand
-    steps to a thousand times. Of 1270 random motions, including stiff ones, by three methods at tolerances from 1e-2 to
-    1e-7, all accurate to ten times their tolerance, 1.6 % exceed this value.
-    """
-    o = result.health.options
-    rtol = o.get("rtol")
-    if rtol is None or o.get("step"):
-        return DEFAULT_IMBALANCE
-    expected = max(FINE_RTOL_FACTOR * rtol**0.5, rtol * (RTOL_FACTOR + RTOL_FACTOR_PER_STEP * result.health.steps))
-    return float(min(expected, max(MAX_IMBALANCE, min(ROUGH_RTOL_FACTOR * rtol, MAX_ROUGH_IMBALANCE))))
-
-
-def energy_moved(result: Result) -> float:
-    """Return the energy moved by the motion [J], the reference for its imbalance.
-
-    It is the sum of the largest kinetic energy and of the ranges of the gravity and spring energies and of every work.
-    """
-    return result.budget.moved(0, len(result.record.rows))
-
-
-def _balance_warning(x: EnergyBudget) -> str:
-    """Return the warning for the whole mechanism, or else for the unconnected part with the worst balance."""
-    found, result = _worst_imbalance(x), x.result
-    if not found and result.health.options.get("rtol") is not None:
-        found = max((_worst_imbalance(x) for x in budgets_by_part(result)), default=())
-    return found[1] if found else ""
-
-
-def _worst_imbalance(x: EnergyBudget) -> tuple[float, str] | tuple[()]:
-    """Return the ratio of the imbalance to the expected one, with a text; nothing if it is not exceeded.
-
-    A connected part is judged by its own energy.
-    """
-    rows, t = len(x.t), x.t
-    if all(lost <= allowed for _, _, lost, _, allowed in _imbalances(x, rows, np.zeros(rows), 0.0)):
-        return ()  # energies between the rows, and rounding, only increase the accepted imbalance
-    for begin, end, lost, there, allowed in _imbalances(x, rows, _kinetic_between_outputs(x), _rest_energy(x)):
-        if lost > allowed and x.known(begin, end):
-            when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
-            return _imbalance_text(x, when, lost, there, allowed)
-    return ()
-
-
-def _imbalances(
-    x: EnergyBudget, rows: int, between_outputs: np.ndarray, least: float
-) -> Iterator[tuple[int, int, float, float, float]]:
-    """Yield the first row and the one after the last, and the energy lost, moved and expected to be lost there [J].
-
-    ``between_outputs`` and ``least``: see `_kinetic_between_outputs` and `_rest_energy`. First for all rows, then for
-    the intervals where the loss may be larger.
-    """
-    part, moved = expected_imbalance(x.result), x.moved(0, rows) + float(between_outputs.max(initial=0.0))
-    yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
-    for begin, end in _suspect_intervals(x, rows, x.kinetic + between_outputs, (part, moved, least)):
-        # velocities v have the absolute error du of the fastest body, and so an energy error m v du
-        lost = float(np.ptp(x.balance[begin:end]))
-        there = x.moved(begin, end) + float(between_outputs[begin:end].max())
-        yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
-
-
-def _suspect_intervals(
-    x: EnergyBudget, rows: int, kinetic: np.ndarray, known: tuple[float, float, float]
-) -> Iterator[tuple[int, int]]:
-    """Return intervals in which the loss may exceed the expected one, by the kinetic energy there alone."""
-    part, moved, least = known
-    for edges in _intervals(x.result, rows):
-        begins, ends = edges[:-1], edges[1:] + 1
-        at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each interval, and the gap between its end and the next
-        high, low, most = (
-            f.reduceat(a, at)[::2] for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
-        )
-        lost = high - low
-        fine = (lost <= least) | (lost <= part * (moved * most) ** 0.5)
-        for k in np.flatnonzero(~fine):
-            yield int(begins[k]), int(ends[k])
-
-
-def _imbalance_text(x: EnergyBudget, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
-    finer = "shorter step" if x.result.health.options.get("step") else "smaller rtol"
-    return lost / allowed if allowed > 0.0 else np.inf, (
-        f"the energy balance{x.of} is off by {lost:.3g} J{when} of {moved:.3g} J moved; {allowed:.1g} J are expected. "
-        f"Compare with a motion with a {finer}"
-    )
-
-
-def _intervals(result: Result, rows: int) -> Iterator[np.ndarray]:
-    """Return the ends of the halves, quarters and so on of the rows of an integrated motion.
-
-    Energy dissipated before or moved after an interval must not hide losses within it.
-    """
-    pieces = 2
-    while (
-        result.health.options.get("rtol") is not None
-        and pieces <= MAX_INTERVALS
-        and rows >= MIN_OUTPUTS_PER_INTERVAL * pieces
-    ):
-        yield np.arange(pieces + 1) * (rows - 1) // pieces
-        pieces *= 2
-
-
-def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
-    """Return the kinetic energy [J] between output times that no row shows: one row per turn may show bodies at rest.
-
-    It is estimated from the accelerations over a step, if there are more steps than rows and the estimate is much
-    larger.
-    """
-    r, none, figures = x.result, np.zeros_like(x.kinetic), x.result.record.figures
-    gain = figures.gain[:, x.bodies].sum(axis=1)
-    known = np.isfinite(gain) & ~(figures.violation > MAX_ACCELERATION_VIOLATION)  # wrong ones estimate nothing
-    if not known.any() or r.health.steps <= len(r.t) or r.health.options.get("step"):
-        return none
-    found = (float(np.ptp(r.t)) / r.health.steps) ** 2 * np.interp(x.t, x.t[known], gain[known])
-    return found if SEEN_PART * found.max() > x.moved(0, len(x.t)) else none
-
-
-def _rest_energy(x: EnergyBudget) -> float:
-    """The energy [J] below which bodies count as at rest: rounding of the potential energy, and creep of all bodies.
-
-    The potential energy is that stored in springs and that of the weight at the mechanism's length, since its zero is
-    arbitrary.
-
-    If work is done, possibly between two rows, the energy that moves all bodies through their travel in the available
-    time is added.
-    """
-    length, t = x.result.values.length, x.t
-    rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
-    span = float(np.ptp(t)) if len(t) else 0.0
-    slow = REST_SPEED * length * characteristic_rate_within(x.result.values.system, span)
-    least = rounding + float(x.mass.sum()) * slow**2
-    if not x.works or not span > 0.0:
-        return least
-    return least + expected_imbalance(x.result) * float(x.mass @ x.travel**2) / max(span, 1e-150) ** 2
 
 
 def _violation_warning(result: Result) -> str:
