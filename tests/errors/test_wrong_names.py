@@ -119,3 +119,11 @@ def test_every_name_of_another_program_leads_to_something():
 def test_near_misses_get_the_right_word(make, message):
     with pytest.raises(fb.ModelError, match=message):
         make()
+
+
+@pytest.mark.parametrize("name", ["A.rate", "A.angle_rate"])
+def test_an_initial_rate_is_given_with_its_coordinate(name):
+    m = fb.Mechanism("pendulum", planar=True)
+    m.add(fb.Body("rod", mass=1, inertia=1), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    with pytest.raises(fb.ModelError, match=r"is Initial\('A.angle', rate=...\)"):
+        m.add(fb.Initial(name, value=2.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -283,6 +283,7 @@ class Model:
             raise ModelError(
                 f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}{found.title} has no coordinate "
                 f"{coordinate!r}{suggest(coordinate, has)}; it has {', '.join(has) or 'none'}"
+                f"{_initial_rate(e, name, coordinate, has)}"
             )
         return found
 
@@ -358,3 +359,9 @@ class Model:
         """Return all names that such a law may use; also curves, if it may use these."""
         sensors = (x.name for x in self.sensors if isinstance(x, Sensor))
         return {"t", *of.inputs, *self.parameters, *sensors, *controller_signals.signal_names(self)}
+
+
+def _initial_rate(e: Element, joint: str, what: str, has: Collection[str]) -> str:
+    """How an `Initial` gives the rate of a joint's coordinate, for messages; empty where no rate was meant."""
+    rates = [c for c in has if what in ("rate", f"{c}_rate")] if isinstance(e, Initial) else []
+    return f"; the initial rate of a coordinate is Initial('{joint}.{rates[0]}', rate=...)" if rates else ""
