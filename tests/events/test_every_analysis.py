@@ -56,7 +56,7 @@ ASKED = {
     "symbolic": lambda m: m.symbolic(),
     "export": lambda m: m.export(),
 }
-ELSEWHERE = {"simulate", "study"}  # know them all: the other files of this folder, and many of such runs
+ELSEWHERE = {"simulate", "study", "live"}  # know them all: the other files of this folder, and many of such runs
 POSITIONS = {"assemble", "check", "mobility", "mass_properties"}
 HOLDS = {"equilibrium", "linearize", "modes"}
 DRIVEN = {"kinematics", "inverse_dynamics"}

@@ -96,6 +96,8 @@ def test_the_same_at_the_same_state(family):
     for seed, m, a, tree in cases(family, FEW if family == "crowds" else EACH):
         if any(isinstance(f, fb.Brake | fb.Clutch) for f in m.forces):  # at rest which way it slides is rounding
             continue
+        if any(isinstance(f, fb.Rope) and f.length is None and f.damping for f in m.forces):
+            continue  # just taut in the reference configuration: whether it damps is rounding
         x = exact(a)
         r = assembled(a) if x is not None else None
         if r is None or (rubbed(m) and r.health.redundant):  # loads that are open leave friction open

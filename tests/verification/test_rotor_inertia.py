@@ -234,3 +234,37 @@ def test_coordinates_in_which_it_is_no_velocity_are_refused():
     everywhere.append(fb.RotorInertia("rotor D", "D.displacement", inertia=0.5))
     with pytest.raises(ModelError, match=r"the loop is cut at.*GearPair"):
         slider_crank(*everywhere, crank_inertia=0.01).simulate(0.1)
+
+
+def test_a_ball_screw_adds_a_mass():
+    """A rotor that turns 300 rad per metre, on a slide in the units of both."""
+    m = fb.Mechanism("slide", planar=True)
+    m.add(fb.Body("table", mass=2, inertia=1), fb.Prismatic("S", "ground", "table", at=(0, 0), axis=(1, 0)))
+    m.add(fb.RotorInertia("screw", "S.displacement", inertia="1e-4 kg*m^2", ratio="300 rad/m"))
+    m.add(fb.Actuator("push", "S.displacement", force=5.0))
+    run = m.simulate(1)
+    assert run["table.x"][-1] == pytest.approx(0.5 * 5.0 / (2.0 + 9.0), rel=1e-9)
+    assert run["screw.force"] == pytest.approx(-9.0 * 5.0 / 11.0, rel=1e-9)
+
+
+def test_the_motion_of_the_carrier_is_neglected():
+    """An arm whose elbow motor is a geared body on the upper link: the difference falls as 1/ratio."""
+
+    def elbow(ratio: float, body: bool) -> float:
+        m = fb.Mechanism("arm", planar=True)
+        m.add(
+            fb.Body("upper", mass=1, com=(0.25, 0), inertia=0.05), fb.Body("lower", mass=1, com=(0.75, 0), inertia=0.05)
+        )
+        m.add(fb.Revolute("S", "ground", "upper", at=(0, 0)), fb.Revolute("E", "upper", "lower", at=(0.5, 0)))
+        m.add(fb.Motor("torque", "S", torque=1.0))
+        J = 0.05 / ratio**2
+        if body:
+            m.add(fb.Body("rotor", mass=1e-9, com=(0.5, 0), inertia=J), fb.Revolute("R", "upper", "rotor", at=(0.5, 0)))
+            m.add(fb.Coupler("gear", ("R.angle", "E.angle"), weights=(1.0, -ratio)))
+        else:
+            m.add(fb.RotorInertia("rotor", "E.angle", inertia=J, ratio=ratio))
+        return m.simulate(0.5, rtol=1e-9, atol=1e-11)["E.angle"][-1]
+
+    gaps = [abs(elbow(n, True) - elbow(n, False)) for n in (20.0, 200.0)]
+    assert 1e-3 < gaps[0] < 0.05
+    assert gaps[1] == pytest.approx(gaps[0] / 10.0, rel=0.1)

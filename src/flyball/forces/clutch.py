@@ -95,9 +95,9 @@ class Brake(AlongSum, CapacityFriction, CoordinateForce):
     """
 
     coordinate: Coordinates = field(kw_only=False)
-    weights: Annotated[Numbers | None, Unit(None)] = None
     capacity: Annotated[Law, LawOf(None, ("value", "rate"))]
     static: Ratio = 1.0
+    weights: Annotated[Numbers | None, Unit(None)] = None
 
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 

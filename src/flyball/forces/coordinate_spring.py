@@ -50,11 +50,11 @@ class CoordinateSpring(AlongSum, CoordinateForce):
     """
 
     coordinate: Coordinates = field(kw_only=False)
-    weights: Annotated[Numbers | None, Unit(None)] = None
     stiffness: Annotated[Number, Unit(None)] = 0.0
     damping: Annotated[Number, Unit(None)] = 0.0
     rest: Annotated[Number, Unit(None)] = 0.0
     force: Annotated[Law | None, LawOf(None, ("value", "rate"))] = None
+    weights: Annotated[Numbers | None, Unit(None)] = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
@@ -102,8 +102,8 @@ class Actuator(AlongSum, CoordinateForce):
     """
 
     coordinate: Coordinates = field(kw_only=False)
-    weights: Annotated[Numbers | None, Unit(None)] = None
     force: Annotated[Law, LawOf(None, ("value", "rate"))]
+    weights: Annotated[Numbers | None, Unit(None)] = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)

@@ -90,12 +90,12 @@ class Limit(AlongSum, Unilateral):
     """
 
     coordinate: Coordinates = field(kw_only=False)
-    weights: Annotated[Numbers | None, Unit(None)] = None
     lower: Annotated[Number | None, Unit(None)] = None
     upper: Annotated[Number | None, Unit(None)] = None
     restitution: Ratio | None = None
     stiffness: Annotated[Number | None, Unit(None)] = None
     damping: Annotated[Number, Unit(None)] = 0.0
+    weights: Annotated[Numbers | None, Unit(None)] = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)

@@ -19,9 +19,10 @@ class RotorInertia(CoordinateForce):
     """Inertia of a motor's rotor and gear, which turns ``ratio`` times as fast as a joint: the armature of a robot.
 
     It adds ``inertia * ratio**2`` to the entry of the mass matrix that belongs to the coordinate, and ``inertia *
-    (ratio * rate)**2 / 2`` to the kinetic energy. The rotor turns about an axis fixed in the body that carries the
-    motor; the gyroscopic torque of its spin on that body is neglected, as Featherstone (2008, section 9.6) and
-    programs for robots do. For that torque, describe the rotor as a `Body` of its own with a `GearPair`.
+    (ratio * rate)**2 / 2`` to the kinetic energy. Only the rotation relative to the body that carries the motor counts,
+    as in Featherstone (2008, section 9.6) and in programs for robots. Neglected are therefore the acceleration of the
+    rotor with its carrier, which is smaller by the factor 1/ratio, and the gyroscopic torque of its spin; both vanish
+    on ground. To include them, describe the rotor as a `Body` of its own with a `GearPair`.
 
     Its ``force`` in results is the inertial force on the joint, -inertia * ratio**2 * acceleration.
 
@@ -33,10 +34,10 @@ class RotorInertia(CoordinateForce):
     name : str
     coordinate : str
         Angle or displacement of a joint: ``"elbow.angle"``.
-    inertia : number [kg m^2] or [kg]
-        Moment of inertia of the rotor about its axis; for a displacement with ``ratio`` 1 a mass.
-    ratio : number
-        Turns of the rotor per turn of the joint. For a displacement, ``inertia`` times its square is a mass.
+    inertia : number [kg m^2]
+        Moment of inertia of the rotor about its axis.
+    ratio : number [1] or [rad/m]
+        Speed of the rotor divided by that of the joint: turns per turn, for a slide radians per metre.
 
     Raises
     ------
@@ -45,13 +46,13 @@ class RotorInertia(CoordinateForce):
     """
 
     coordinate: str = field(kw_only=False)
-    inertia: Annotated[Number, Unit(None)]
-    ratio: Annotated[Number, Unit("1")] = 1.0
+    inertia: Annotated[Number, Unit("kg*m^2")]
+    ratio: Annotated[Number, Unit(None)] = 1.0
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
     adds_inertia: ClassVar[bool] = True
-    dimensions: ClassVar = {"inertia": ("kg", "kg*m^2")}
+    dimensions: ClassVar = {"ratio": ("rad/m", "1")}
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
     def coordinate_text(self) -> str:
@@ -62,7 +63,10 @@ class RotorInertia(CoordinateForce):
         """Require an inertia that is not negative, and a ratio other than zero."""
         nonnegative(self, n, "inertia")
         if n.ratio == 0.0:
-            raise ModelError(f"{self.title}: ratio is 0, with which the rotor does not turn; give turns per turn")
+            raise ModelError(
+                f"{self.title}: ratio is 0, with which the rotor does not turn; give its turns per turn of the joint, "
+                "for instance 50"
+            )
 
     def examine(self, model: Model) -> None:
         """Require the coordinate of an axis of a joint."""

@@ -102,7 +102,7 @@ def _in_requested_coordinates(
 ) -> tuple[Assembly, str]:
     """Convert an assembly to the requested coordinates; large mechanisms stay in absolute coordinates."""
     s = base.compiled.structure
-    if many is not None and not s.missed_rotors and coordinates == "auto" and many(s.nv - len(s.rows), 0):
+    if many is not None and not s.rotors_without_velocity and coordinates == "auto" and many(s.nv - len(s.rows), 0):
         return base, SPARSE_REASON
     return choose_coordinates(base, coordinates, parameters)
 

@@ -310,7 +310,7 @@ class InstantAnalysis(RunAnalysis):
     def run(self, model: Model, o: AssembleOptions) -> Any:
         """The state as a result with one time."""
         a = assemble(model, t=o.t, parameters=o.parameters)
-        if a.compiled.structure.missed_rotors:
+        if a.compiled.structure.rotors_without_velocity:
             a, _ = choose_coordinates(a, "joint", o.parameters)
         return snapshot(MechanismState.moving(a.compiled, a.t, a.q, a.v))
 

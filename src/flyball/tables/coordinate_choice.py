@@ -69,17 +69,17 @@ def require_rotor_coordinates(s: Structure) -> None:
     ModelError
         Naming the element, its coordinate and the remedy.
     """
-    for e in s.missed_rotors:
+    for e in s.rotors_without_velocity:
         text = e.coordinate_text()
         if not s.tree:
             raise ModelError(
-                f"{e.title} adds inertia along {text!r}, which is a velocity in joint coordinates only; "
+                f"{e.title} adds inertia along {text!r}, whose rate is a velocity in joint coordinates only; "
                 "choose coordinates='joint'"
             )
         raise ModelError(
-            f"{e.title} adds inertia along {text!r}, which is not a velocity in joint coordinates: the loop is cut at "
-            "its joint, or a friction or an event needs the reaction of that joint. Describe the rotor as a Body on a "
-            "Revolute joint, with a GearPair"
+            f"{e.title} adds inertia along {text!r}, whose rate is no velocity of the joint coordinates: the loop is "
+            "cut at its joint, or a friction or an event needs the reaction of that joint. Describe the rotor as a "
+            "Body on a Revolute joint, with a GearPair"
         )
 
 

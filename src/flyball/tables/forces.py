@@ -137,7 +137,7 @@ def place_rotors(s: Structure) -> None:
             joint, what = s.model.coordinate(e.coordinate_text(), e)
             row = coordinate_row(s, joint.name, what)
             if row is None:
-                s.missed_rotors.append(e)
+                s.rotors_without_velocity.append(e)
             else:
                 s.rotors.append((e, int(s.tables["tree"].v[row])))
 

@@ -92,7 +92,7 @@ class Structure:
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
     rotors: list[tuple[Any, int]] = field(default_factory=list)  # elements that add inertia to a velocity, and which
-    missed_rotors: list[Any] = field(default_factory=list)  # those whose coordinate is no velocity here
+    rotors_without_velocity: list[Any] = field(default_factory=list)  # those whose coordinate is no velocity here
     force_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined force
     term_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined term
     guard_code: list[CodeTable | None] = field(default_factory=list)  # code table of each guard of a user's switch
