@@ -63,6 +63,8 @@ CLOSED_BY_EQUALITIES = (Spherical, Fixed, Revolute)
 """Joints that may close loops: connect, weld, and connect at two points of the axis."""
 EQUALITY_IMPEDANCE = {"solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Impedance of equalities: the largest of MuJoCo (mjMAXIMP)."""
+WORLD = "world"
+"""Name of ground in MJCF, which no other body can have."""
 SMALLEST_INERTIA = 1e-15
 """Mass and moments of inertia that MuJoCo demands of bodies that move (mjMINVAL)."""
 ADDITIVE = {"damping", "frictionloss", "armature"}
@@ -110,6 +112,7 @@ class _Writer:
             ET.Element(x) for x in ("asset", "tendon", "equality", "actuator")
         )
         self.names = Names(e.name for e in model.elements())
+        self.not_world = self.names.new(f"{WORLD}_")
         self.motors: list[tuple[Element, str]] = []  # with the parameter that is the control
 
     def text(self) -> str:
@@ -163,12 +166,16 @@ class _Writer:
                 continue
             name = names[b]
             T = np.linalg.inv(self._pose(carrier)) @ self._pose(name)
-            tag = self.tags[name] = ET.SubElement(above, "body", {"name": name} | _placed(T))
+            tag = self.tags[name] = ET.SubElement(above, "body", {"name": self._body_name(name)} | _placed(T))
             for row in joints:
                 self._joint(tag, name, row)
             self._inertial(tag, name, any(tree.nv[row] for row in joints) or len(joints) > 1)
             self._carried(tag, name)
             tags[b] = tag, name, []
+
+    def _body_name(self, name: str) -> str:
+        """Name of a body in the file."""
+        return self.not_world if name == WORLD else name
 
     def _is_link(self, name: str) -> bool:
         """Whether a body only connects joints: it has no mass, shape, frame or end of a force, and closes no loop."""
@@ -341,7 +348,8 @@ class _Writer:
             first, second = joint_bodies(self.model, e)
             if first == GROUND:
                 first, second = second, first
-            ends = {"body1": first} | ({"body2": second} if second != GROUND else {}) | EQUALITY_IMPEDANCE
+            ends = {f"body{k}": self._body_name(x) for k, x in enumerate((first, second), 1) if x != GROUND}
+            ends |= EQUALITY_IMPEDANCE
             if isinstance(e, Fixed):
                 ET.SubElement(self.equalities, "weld", {"name": name} | ends)
                 continue

@@ -29,7 +29,7 @@ from ..model.body import GROUND, Body, Frame, Ground
 from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
-from .robot_file import ROUNDING, Names, RobotFile, initial_in_range, line_of, rows, stops
+from .robot_file import ROUNDING, UNLIMITED, Names, RobotFile, initial_in_range, line_of, rows, stops
 
 T = TypeVar("T", bound=Model)
 
@@ -429,8 +429,9 @@ class _Reader(RobotFile):
 
     def _note_unused(self, tag: ET.Element) -> None:
         known = UNDERSTOOD.get(tag.tag, set())
-        for name in tag.attrib:
-            if name not in known and not name.startswith("xmlns"):
+        for name, value in tag.attrib.items():
+            unlimited = tag.tag == "limit" and value == repr(UNLIMITED)  # as `save_urdf` writes it
+            if name not in known and not name.startswith("xmlns") and not unlimited:
                 self.unused.setdefault(f"{tag.tag} {name}", []).append(line_of(tag))
         for x in tag:
             if x.tag == "transmission":
