@@ -17,21 +17,22 @@ U = 0.7
 def arm(ending: str) -> fb.Mechanism:
     """A tree on ground, whose names are those that a writer makes of other names."""
     m = fb.Mechanism("arm", gravity=(0, 0, -9.80665), parameters={"u": U})
-    last = "world" if ending == "xml" else "d"  # MuJoCo's name of ground
-    for k, name in enumerate(("a", "b", "c", last, "hand", "wheel", "rack")):
+    for k, name in enumerate(("a", "b", "c", "d", "hand", "wheel", "rack")):
         m.add(fb.Body(name, mass=1 + k, inertia=(0.1, 0.2, 0.25), com=(0.1, 0, 0.2), position=(0.5 * k, 0.1 * k, 0.2)))
     m.add(
         fb.Revolute("A", "ground", "a", at=(0, 0, 0), axis=(0, 1, 0)),
         fb.Revolute("B", "b", "a", at=(0.5, 0, 0), axis=(0, 1, 0.2)),  # the other way round
         fb.Prismatic("P", "b", "c", at=(1, 0, 0), axis=(1, 0, 1)),
-        fb.Planar("Q", "c", last, at=(1.5, 0, 0), axis=(0, 1, 1)),
-        fb.Fixed("tip_fixed", last, "hand", at=(2, 0, 0)),
+        fb.Planar("Q", "c", "d", at=(1.5, 0, 0), axis=(0, 1, 1)),
+        fb.Fixed("tip_fixed", "d", "hand", at=(2, 0, 0)),
         fb.Revolute("Q_x", "ground", "wheel", at=(2.5, 0, 0), axis=(0, 1, 0)),
         fb.Prismatic("K", "ground", "rack", at=(2.5, 0, 0.3), axis=(1, 0, 0)),
     )
     m.add(fb.Frame("tip", "hand", position=(0, 0, 0.3)), fb.Frame("x_0", "a", position=(0.1, 0.2, 0.3)))
     if ending == "xml":
-        m.add(fb.Body("free", mass=1, inertia=(0.1, 0.2, 0.25), position=(5, 0, 0)), fb.Frame("free_free", "free"))
+        for k, name in enumerate(("free", "ball")):
+            m.add(fb.Body(name, mass=1, inertia=(0.1, 0.2, 0.25), position=(5 + k, 0, 0)))
+        m.add(fb.Spherical("free_free", "free", "ball", at=(5.5, 0, 0)))
     return m
 
 
@@ -215,6 +216,7 @@ def test_stops_and_couplings_of_urdf_count_from_the_drawn_configuration(tmp_path
     assert not remarks
     (limit,) = again.limits
     assert (limit.lower, limit.upper) == (None, pytest.approx(0.7))
+    assert 'effort="1000000000.0" velocity="1000000000.0"' in (tmp_path / "m.urdf").read_text()  # not 0: no motor
     q = again.prepare(coordinates="joint").q
     assert (q[0] + 0.3) + 2 * (q[1] - 0.2) == pytest.approx(0.1)
 
@@ -229,17 +231,18 @@ def test_a_circle_of_couplings_is_cut(tmp_path):
     assert len(again.couplings) == 2
 
 
-def test_names_of_equalities_do_not_clash(tmp_path):
+def test_names_of_equalities_and_of_ground_do_not_clash(tmp_path):
     mujoco = pytest.importorskip("mujoco")
     m = fb.Mechanism("loop", gravity=(0, 0, -9.8))
     for k, name in enumerate("abc"):
         m.add(fb.Body(name, mass=1, inertia=(0.1, 0.1, 0.1), position=((0, 0, 0.5), (0.5, 0, 1), (1, 0, 0.5))[k]))
     places = {"A": ("ground", "a", (0, 0, 0)), "B": ("a", "b", (0, 0, 1)), "C": ("b", "c", (1, 0, 1)), "D": ("c", "ground", (1, 0, 0))}  # fmt: skip
     m.add(*(fb.Revolute(name, i, j, at=at, axis=(0, 1, 0)) for name, (i, j, at) in places.items()))
-    m.add(fb.Body("w", mass=1, inertia=(1, 1, 1), position=(3, 0, 0)))
-    m.add(fb.Revolute("W", "ground", "w", at=(3, 0, 0), axis=(0, 1, 0)))
-    m.add(*(fb.Coupler(f"{j}_axis", ["A.angle", "W.angle"], weights=[1, 2]) for j in "D"))
-    m.save(tmp_path / "loop.xml")
+    m.add(fb.Body("world", mass=1, inertia=(1, 1, 1), position=(3, 0, 0)), fb.Frame("world_", "world"))
+    m.add(fb.Revolute("W", "ground", "world", at=(3, 0, 0), axis=(0, 1, 0)))
+    m.add(fb.Coupler("D_axis", ["A.angle", "W.angle"], weights=[1, 2]))
+    again, remarks, _ = saved_and_read(m, tmp_path / "loop.xml")
+    assert "the name of Body 'world' (MuJoCo's of ground; world__ in the file)" in remarks
     M = mujoco.MjModel.from_xml_path(str(tmp_path / "loop.xml"))
-    names = [M.equality(k).name for k in range(M.neq)]
-    assert len(names) == 3 and len(set(names)) == 3
+    assert {M.equality(k).name for k in range(M.neq)} == {"D", "D_axis", "D_axis_"}
+    assert again["W"].body_j == "world__"

@@ -166,6 +166,8 @@ class _Writer:
                 continue
             name = names[b]
             T = np.linalg.inv(self._pose(carrier)) @ self._pose(name)
+            if name == WORLD:
+                self.missing.append(f"the name of Body {name!r} (MuJoCo's of ground; {self.not_world} in the file)")
             tag = self.tags[name] = ET.SubElement(above, "body", {"name": self._body_name(name)} | _placed(T))
             for row in joints:
                 self._joint(tag, name, row)
