@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numpy as np
@@ -119,6 +120,7 @@ def test_limits_friction_and_equalities(tmp_path):
         ('<tendon><spatial name="w" frictionloss="1" limited="true" range="0.1 2"><site site="s1"/><site site="s3"/></spatial></tendon>', r"lower limit of tendon w \(a path has no stop.*friction of tendon w \(a path has no friction"),
         ('<tendon><fixed name="w"><joint joint="A" coef="0"/></fixed></tendon>', r"tendon w \(its coefficients are 0\)"),
         ('<tendon><spatial name="w"><site site="s1"/><site site="hook"/></spatial></tendon><equality><tendon name="e" tendon1="w"/></equality>', r"equality e \(read of fixed tendons only\)"),
+        ('<tendon><fixed name="w"><joint joint="A" coef="2"/></fixed><fixed name="u"><joint joint="A" coef="1"/></fixed></tendon><equality><tendon name="e" tendon1="w" tendon2="u" polycoef="0 2 0 0 0"/></equality>', r"equality e \(its coefficients cancel\)"),
         ('<equality><joint name="e" joint1="A" joint2="B" polycoef="0 1 2 0 0"/></equality>', r"equality e \(its polynomial is not linear\)"),
         ('<actuator><muscle name="x" joint="A" lengthrange="0 1"/></actuator>', r"actuator x \(it has activation states\)"),
         ('<actuator><motor name="x" joint="Q"/></actuator>', r"actuator x \(it acts on neither a hinge, nor a slide, nor a tendon that is read\)"),
@@ -155,6 +157,40 @@ def test_a_joint_starts_within_its_range(tmp_path):
         tmp_path, BODIES.replace('name="S" type="slide"', 'name="S" type="slide" limited="true" range="0.1 0.3"')
     )
     assert m.simulate(0.01, outputs=2)["S.displacement"][0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("inside", "match"),
+    [
+        ('<fixed name="w" limited="true" range="0.3 1"><joint joint="B" coef="1"/><joint joint="S" coef="2"/></fixed>', "tendon w begins at 0, outside 0.3 to 1"),
+        ('<spatial name="w" limited="true" range="0 0.1"><site site="s1"/><site site="hook"/></spatial>', "tendon w begins at .*, outside 0 to 0.1"),
+        ('<spatial name="w" limited="true" range="5 9"><site site="s1"/><site site="hook"/></spatial>', ""),
+    ],
+)  # fmt: skip
+def test_tendons_that_begin_outside_their_range_are_named(tmp_path, inside, match):
+    """The motion is refused there; where the joints' initial values bring them into the range there is no remark."""
+    m, _, told = read(tmp_path, f"{BODIES}<tendon>{inside}</tendon>")
+    if match:
+        assert re.search(match + ". A motion cannot begin there: add Initial elements", told)
+        with pytest.raises(fb.ModelError, match="the motion starts beyond it"):
+            m.simulate(0.01, outputs=2)
+    else:
+        assert "begins at" not in told
+    slide = BODIES.replace('name="S" type="slide"', 'name="S" type="slide" limited="true" range="0.3 0.4"')
+    if "fixed" in inside:
+        assert "begins at" not in read(tmp_path, f"{slide}<tendon>{inside}</tendon>")[2]
+
+
+def test_armature_of_a_tendon(tmp_path):
+    """Along one coordinate it is that of a rotor with the tendon's coefficient as its ratio; else it is listed."""
+    inside = """<tendon><fixed name="one" armature="0.3"><joint joint="S" coef="-2"/></fixed>
+      <fixed name="two" armature="0.3"><joint joint="S" coef="2"/><joint joint="A" coef="1"/></fixed></tendon>"""
+    m, M, told = read(tmp_path, BODIES + inside)
+    assert "armature of tendon two (inertia is read along one coordinate)" in told and "tendon one" not in told
+    bare, _, _ = read(tmp_path, BODIES)
+    p, r = m.prepare(coordinates="joint"), bare.prepare(coordinates="joint")
+    k = p.names.index("S.displacement")
+    assert p.mass_matrix(p.q)[k, k] - r.mass_matrix(r.q)[k, k] == pytest.approx(0.3 * 4, rel=1e-12)
 
 
 def test_errors_name_the_file(tmp_path):

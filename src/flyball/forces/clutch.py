@@ -13,7 +13,7 @@ from ..constraints.switches.friction import FRICTION
 from ..errors import ModelError
 from ..math.scalar import choose
 from ..model.element import Coordinates, Law, LawOf, Numbers, Ratio, Unit, element
-from ..model.force import AlongSum, CoordinateForce, Switch
+from ..model.force import CoordinateForce, Switch, WeightedSumForce
 from .joint_friction import SLIDING
 
 if TYPE_CHECKING:
@@ -46,8 +46,11 @@ class CapacityFriction:
 
     def switches(self) -> tuple[Switch, ...]:
         """Return one friction switch."""
-        weighted = getattr(self, "weights", None) is not None
-        return (Switch(FRICTION, along=self.along(), slides=True, weighted=weighted),)
+        return (Switch(FRICTION, along=self.along(), slides=True, weighted=self.is_weighted()),)
+
+    def is_weighted(self) -> bool:
+        """Return False: it acts along one coordinate, or between two."""
+        return False
 
     def check(self, n: SimpleNamespace) -> None:
         """Require a static ratio of at least 1."""
@@ -67,7 +70,7 @@ class CapacityFriction:
 
 
 @element
-class Brake(AlongSum, CapacityFriction, CoordinateForce):
+class Brake(WeightedSumForce, CapacityFriction, CoordinateForce):
     """A brake along a coordinate: it locks the coordinate, or slips if the load exceeds its capacity.
 
     While slipping it acts with its capacity against the motion; at rest it can hold ``static`` times that. A locked
@@ -103,7 +106,7 @@ class Brake(AlongSum, CapacityFriction, CoordinateForce):
 
     def check(self, n: SimpleNamespace) -> None:
         """Require weights for a sum of coordinates, and a static ratio of at least 1."""
-        self.check_sum(n)
+        self.check_weights_given(n)
         super().check(n)
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..model.element import Coordinates, Law, LawOf, Number, Numbers, Unit, element, nonnegative
-from ..model.force import AlongSum, CoordinateForce
+from ..model.force import CoordinateForce, WeightedSumForce
 
 KIND = 1
 
@@ -27,7 +27,7 @@ def energy(par, x):
 
 
 @element
-class CoordinateSpring(AlongSum, CoordinateForce):
+class CoordinateSpring(WeightedSumForce, CoordinateForce):
     """Spring and damper along a coordinate, for instance of a prismatic joint, or a point's height.
 
     The force (or torque) -k (x - rest) - c rate acts along the coordinate; full turns of angles are counted.
@@ -63,7 +63,7 @@ class CoordinateSpring(AlongSum, CoordinateForce):
 
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness and damping must not be negative."""
-        self.check_sum(n)
+        self.check_weights_given(n)
         nonnegative(self, n, "stiffness", "damping")
         refuse_without_stiffness(self, "rest", 0.0)
 
@@ -86,7 +86,7 @@ def measuring_spring(e: Any) -> CoordinateSpring:
 
 
 @element
-class Actuator(AlongSum, CoordinateForce):
+class Actuator(WeightedSumForce, CoordinateForce):
     """A force or torque along a coordinate by a law: a hydraulic cylinder in a prismatic joint, a controller.
 
     Parameters
@@ -111,7 +111,7 @@ class Actuator(AlongSum, CoordinateForce):
 
     def check(self, n: SimpleNamespace) -> None:
         """Require weights for a sum of coordinates."""
-        self.check_sum(n)
+        self.check_weights_given(n)
 
     def laws(self) -> tuple[Law | None, ...]:
         """Return the force law."""

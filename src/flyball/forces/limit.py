@@ -16,7 +16,7 @@ from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.contact import check_restitution
 from ..model.element import Coordinates, Number, Numbers, Ratio, Unit, element
-from ..model.force import AlongSum, Switch, Unilateral, check_elastic
+from ..model.force import Switch, Unilateral, WeightedSumForce, check_elastic
 
 KIND = 8
 
@@ -60,7 +60,7 @@ def stop_switch_numbers(n: SimpleNamespace, lower: float | None, upper: float | 
 
 
 @element
-class Limit(AlongSum, Unilateral):
+class Limit(WeightedSumForce, Unilateral):
     """Stops of a coordinate: it stays between ``lower`` and ``upper``.
 
     A rigid stop reflects an impact at the speed v with ``restitution`` times v. An elastic stop (``stiffness``) pushes
@@ -104,7 +104,7 @@ class Limit(AlongSum, Unilateral):
 
     def check(self, n: SimpleNamespace) -> None:
         """Require at least one stop, rigid or elastic."""
-        self.check_sum(n)
+        self.check_weights_given(n)
         check_restitution(self, n)
         check_elastic(self, n)
         if self.lower is None and self.upper is None:
@@ -124,7 +124,7 @@ class Limit(AlongSum, Unilateral):
     def switches(self) -> tuple[Switch, ...]:
         """Return one switch along the coordinate or sum."""
         kind = ELASTIC if self.acts() else STOP
-        return (Switch(kind, along=self.along(), slides=self.acts(), weighted=self.weights is not None),)
+        return (Switch(kind, along=self.along(), slides=self.acts(), weighted=self.is_weighted()),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Return the bounds, and the properties of the stops."""

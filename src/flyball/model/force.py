@@ -18,7 +18,7 @@ from ..constraints.blocks import DISTANCE, Row
 from ..constraints.registry import no_inputs
 from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
-from .element import Element, Law, Point, PointPair, Points, nonnegative, positive
+from .element import Element, Law, Numbers, Point, PointPair, Points, nonnegative, positive
 from .geometry import vector
 from .joint import WEIGHT_UNITS, WorldFrame, check_weights
 
@@ -193,11 +193,12 @@ class CoordinateForce(Force):
         return all(set("FM") <= set(formula.of_kind.points) for _, _, formula in self.path())
 
 
-class AlongSum:
+class WeightedSumForce:
     """Base class of elements along one coordinate (``coordinate``), or along a sum of several with ``weights``."""
 
     title: str
     coordinate: str | tuple[str, ...]
+    weights: Numbers | None
 
     kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHT_UNITS}
 
@@ -209,11 +210,15 @@ class AlongSum:
         """Return the coordinates."""
         return (self.coordinate,) if isinstance(self.coordinate, str) else self.coordinate
 
+    def is_weighted(self) -> bool:
+        """Return whether it acts along a weighted sum."""
+        return self.weights is not None
+
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Return the weights as given; none for one coordinate."""
         return n.weights or ()
 
-    def check_sum(self, n: SimpleNamespace) -> None:
+    def check_weights_given(self, n: SimpleNamespace) -> None:
         """Require weights for a sum, and none for one coordinate."""
         if isinstance(self.coordinate, str):
             if n.weights is not None:

@@ -6,7 +6,6 @@ body are a chain of massless links. What has no meaning here is listed in a `Mod
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,13 +15,12 @@ import numpy as np
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
-from ..forces.limit import Limit
 from ..forces.rotor_inertia import RotorInertia
 from ..joints.fixed import Fixed
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
 from ..joints.spherical import Spherical
-from ..model.body import GROUND, Body, Frame, Ground, Initial
+from ..model.body import GROUND, Body, Frame, Ground
 from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
@@ -35,13 +33,11 @@ from ..model.shapes.plane import Plane
 from ..model.shapes.solid import Solid
 from ..model.shapes.sphere import Sphere
 from .mjcf_tendons import Tendons, linear_relation
-from .robot_file import rows
+from .robot_file import ROUNDING, Names, initial_in_range, rows, stops
 
 T = TypeVar("T", bound=Model)
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's kinds of joints (mjtJoint)."""
-ROUNDING = 1e-9
-"""Of poses in a file, relative to the size of the model."""
 COORDINATES = {SLIDE: "displacement", HINGE: "angle"}
 ON_JOINT, ON_TENDON = (0, 1), 3
 """MuJoCo's kinds of transmissions (mjtTrn): along a joint, also in the parent's axes; along a tendon."""
@@ -76,12 +72,13 @@ class Reader:
         self.mujoco, self.M, self.path = mujoco, model, path
         self.D = mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.D)
-        self.taken: set[str] = {GROUND}
+        self.names = Names({GROUND})
         self.bodies: dict[int, str] = {0: GROUND}
         self.joints: dict[int, str] = {}
         self.coordinates: dict[int, str] = {}  # of hinges and slides
         self.sites: dict[int, str] = {}
         self.unused: list[str] = []
+        self.start = model.qpos0.copy()  # configuration in which a motion begins
 
     def name(self, kind: str, k: int, default: str) -> str:
         """A name that flyball permits and that is not taken."""
@@ -92,13 +89,8 @@ class Reader:
         return self.mujoco.mj_id2name(self.M, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind}"), k) or ""
 
     def free_name(self, wanted: str) -> str:
-        """The name, with other characters where Python permits none, and not one that is taken."""
-        plain = re.sub(r"\W", "_", wanted)
-        plain = plain if plain.isidentifier() else f"_{plain}"
-        while plain in self.taken:
-            plain += "_"
-        self.taken.add(plain)
-        return plain
+        """A name that flyball permits and that is not taken."""
+        return self.names.new_identifier(wanted)
 
     def mechanism(self, make: Callable[..., T]) -> T:
         """The mechanism."""
@@ -110,7 +102,7 @@ class Reader:
             joints = list(range(M.body_jntadr[b], M.body_jntadr[b] + M.body_jntnum[b])) if M.body_jntnum[b] else []
             self._add_body(m, b, joints)
             for j in joints:
-                later += self._losses(j)
+                later += self._joint_elements(j)
         m.add(*later)
         for k in range(M.nsite):
             m.add(self._frame(k))
@@ -182,7 +174,7 @@ class Reader:
             return Prismatic(name, first, second, at=at, axis=axis, displacement=drawn)
         return Revolute(name, first, second, at=at, axis=axis, angle=drawn)
 
-    def _losses(self, j: int) -> Iterator[Element]:
+    def _joint_elements(self, j: int) -> Iterator[Element]:
         """Stops, spring, damping and friction of a joint, and an initial value if that of `qpos0` is not permitted."""
         M, d = self.M, self.M.jnt_dofadr[j]
         armature = M.dof_armature[d : d + (6, 3, 1, 1)[M.jnt_type[j]]]
@@ -197,9 +189,10 @@ class Reader:
         along = self.coordinates[j]
         if M.jnt_limited[j]:
             lower, upper = M.jnt_range[j].tolist()
-            yield Limit(self.free_name(f"{name}_limit"), along, lower=lower, upper=upper)
-            if not lower <= M.qpos0[M.jnt_qposadr[j]] <= upper:
-                yield Initial(along, value=0.5 * (lower + upper))
+            yield from stops(lambda: self.free_name(f"{name}_limit"), lower, upper, coordinate=along)
+            for e in initial_in_range(along, lower, upper, float(M.qpos0[M.jnt_qposadr[j]])):
+                self.start[M.jnt_qposadr[j]] = e.value
+                yield e
         stiffness, damping, friction = (float(x) for x in (M.jnt_stiffness[j], M.dof_damping[d], M.dof_frictionloss[d]))
         if stiffness or damping:
             rest = float(M.qpos_spring[M.jnt_qposadr[j]])
@@ -216,23 +209,23 @@ class Reader:
         kind = kinds(int(M.eq_type[k]))
         name = self.name("EQUALITY", k, f"equality{k}")
         a, b, data = M.eq_obj1id[k], M.eq_obj2id[k], M.eq_data[k]
-        relation: Element | None = None
+        relation: Element | str = ""
         if not M.eq_active0[k]:
-            self.unused.append(f"equality {name} (it is not active)")
+            relation = "it is not active"
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             yield from self._closed_loop(name, k, kind == kinds.mjEQ_WELD)
         elif kind not in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
-            self.unused.append(f"equality {name} (of flexible bodies)")
+            relation = "of flexible bodies"
         elif data[2:5].any():
-            self.unused.append(f"equality {name} (its polynomial is not linear)")
+            relation = "its polynomial is not linear"
         elif kind == kinds.mjEQ_TENDON:
             relation = self.tendons.equality(name, int(a), int(b), float(data[0]), float(data[1]))
-            if relation is None:
-                self.unused.append(f"equality {name} (read of fixed tendons only)")
         else:
             relation = self._joint_relation(name, int(a), int(b), float(data[0]), float(data[1]))
-        if relation is not None:
+        if isinstance(relation, Element):
             yield relation
+        elif relation:
+            self.unused.append(f"equality {name} ({relation})")
 
     def _closed_loop(self, name: str, k: int, weld: bool) -> Iterator[Element]:
         """The joint of a connect or weld, of bodies as they are in `qpos0`, or of sites, which it brings together."""
@@ -254,7 +247,7 @@ class Reader:
                 self.unused.append(f"relpose of equality {name} (bodies are welded as they are in qpos0)")
         yield joint(name, self.bodies[a], self.bodies[b], at=tuple(at.tolist()))
 
-    def _joint_relation(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | None:
+    def _joint_relation(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | str:
         """Relation y - y0 = offset + slope (x - x0) of two joints, or of one (``second`` is -1)."""
         y0, x0 = (float(self.M.qpos0[self.M.jnt_qposadr[j]]) if j >= 0 else 0.0 for j in (first, second))
         weights = {self.coordinates[first]: 1.0} | ({self.coordinates[second]: -slope} if second >= 0 else {})
@@ -372,3 +365,9 @@ class Reader:
             self.unused.append("contact of geoms (add shapes without looks=True, and fb.Contact)")
         if self.unused:
             warn_user(f"{self.path.name}: not used: {'; '.join(dict.fromkeys(self.unused))}", ModelWarning)
+        if self.tendons.out_of_range:
+            warn_user(
+                f"{self.path.name}: {'; '.join(self.tendons.out_of_range)}. A motion cannot begin there: add Initial "
+                f"elements that bring it into the range",
+                ModelWarning,
+            )

@@ -16,9 +16,11 @@ from ..forces.coordinate_spring import Actuator, CoordinateSpring
 from ..forces.limit import Limit
 from ..forces.path_spring import PathSpring
 from ..forces.rope import Rope
+from ..forces.rotor_inertia import RotorInertia
 from ..joints.coupler import Coupler
 from ..model.body import Driver
 from ..model.element import Element
+from .robot_file import ROUNDING, stops
 
 if TYPE_CHECKING:
     from .mjcf import Reader
@@ -59,6 +61,7 @@ class Tendons:
         M = reader.M
         self.names = {k: reader.given_name("TENDON", k) or f"tendon{k}" for k in range(M.ntendon)}
         self.read: dict[int, LinearSum | Path] = {}
+        self.out_of_range: list[str] = []
         for k in self.names:
             self._read(k)
 
@@ -86,14 +89,41 @@ class Tendons:
     def elements(self) -> Iterator[Element]:
         """Springs, dampers, stops and friction of tendons."""
         M = self.reader.M
+        self._check_ranges()
         for k, tendon in self.read.items():
             name = self.names[k]
             for what in ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield"):
                 if np.any(getattr(M, what, np.zeros((k + 1, 1)))[k]):  # of MuJoCo 3.5 and later
                     self.reader.unused.append(f"{what} of tendon {name} (springs and dampers are linear)")
-            if getattr(M, "tendon_armature", np.zeros(k + 1))[k]:
-                self.reader.unused.append(f"armature of tendon {name} (no inertia along a tendon)")
+            yield from self._armature(k, tendon)
             yield from self._along_sum(k, tendon) if isinstance(tendon, LinearSum) else self._along_path(k, tendon)
+
+    def _check_ranges(self) -> None:
+        """Note tendons that begin outside their ranges, where a motion cannot begin."""
+        mujoco, M = self.reader.mujoco, self.reader.M
+        D = mujoco.MjData(M)
+        D.qpos[:] = self.reader.start
+        for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon):
+            compute(M, D)
+        for k, tendon in self.read.items():
+            lower, upper = M.tendon_range[k].tolist()
+            lower = lower if isinstance(tendon, LinearSum) else 0.0  # a path has no stop at a least length
+            value, margin = float(D.ten_length[k]), ROUNDING * (upper - lower)
+            if M.tendon_limited[k] and not lower - margin <= value <= upper + margin:
+                self.out_of_range.append(
+                    f"tendon {self.names[k]} begins at {value:.6g}, outside {lower:g} to {upper:g}"
+                )
+
+    def _armature(self, k: int, tendon: LinearSum | Path) -> Iterator[Element]:
+        """Armature along one coordinate, of which the tendon's length is a multiple."""
+        inertia, name = float(getattr(self.reader.M, "tendon_armature", np.zeros(k + 1))[k]), self.names[k]
+        if not inertia:
+            return
+        if isinstance(tendon, LinearSum) and len(tendon.weights) == 1:
+            ((along, ratio),) = tendon.weights.items()
+            yield RotorInertia(self.reader.free_name(f"{name}_rotor"), along, inertia=inertia, ratio=ratio)
+        else:
+            self.reader.unused.append(f"armature of tendon {name} (inertia is read along one coordinate)")
 
     def _spring(self, k: int) -> tuple[float, float, float, float]:
         """Stiffness, damping, and least and greatest length without force of the spring."""
@@ -106,10 +136,10 @@ class Tendons:
         stiffness, damping, lower, upper = self._spring(k)
         if M.tendon_limited[k]:
             least, greatest = M.tendon_range[k].tolist()
-            yield Limit(free_name(f"{name}_limit"), **tendon.fields, lower=least, upper=greatest)
+            yield from stops(lambda: free_name(f"{name}_limit"), least, greatest, **tendon.fields)
         if stiffness and lower < upper:
-            stops: dict[str, Any] = {"lower": lower, "upper": upper, "stiffness": stiffness}
-            yield Limit(free_name(f"{name}_spring"), **tendon.fields, **stops)
+            band: dict[str, Any] = {"lower": lower, "upper": upper, "stiffness": stiffness}
+            yield Limit(free_name(f"{name}_spring"), **tendon.fields, **band)
             stiffness = 0.0
         if stiffness or damping:
             given: dict[str, Any] = {"stiffness": stiffness, "rest": lower} if stiffness else {}
@@ -147,13 +177,13 @@ class Tendons:
             return PathSpring(name, tendon.frames, force=law("length", -1.0))
         return None
 
-    def equality(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | None:
-        """Relation L - L0 = offset + slope (L' - L0') of two fixed tendons, or of one (``second`` is -1)."""
+    def equality(self, name: str, first: int, second: int, offset: float, slope: float) -> Element | str:
+        """Relation L - L0 = offset + slope (L' - L0') of fixed tendons, or of one (``second`` is -1); or why none."""
         M, pair = self.reader.M, [self.read.get(k) for k in (first, second) if k >= 0]
         weights: dict[str, float] = {}
         for tendon, factor in zip(pair, (1.0, -slope), strict=False):
             if not isinstance(tendon, LinearSum):
-                return None
+                return "read of fixed tendons only"
             for coordinate, w in tendon.weights.items():
                 weights[coordinate] = weights.get(coordinate, 0.0) + factor * w
         value = (
@@ -162,9 +192,9 @@ class Tendons:
         return linear_relation(name, weights, value)
 
 
-def linear_relation(name: str, weights: dict[str, float], value: float) -> Element | None:
-    """The element that keeps a weighted sum of coordinates at a value; None if there is nothing to keep."""
+def linear_relation(name: str, weights: dict[str, float], value: float) -> Element | str:
+    """The element that keeps a weighted sum of coordinates at a value; or why there is none."""
     kept = {coordinate: w for coordinate, w in weights.items() if w}
     if len(kept) > 1:
         return Coupler(name, tuple(kept), weights=tuple(kept.values()), value=value)
-    return next((Driver(name, coordinate, value / w) for coordinate, w in kept.items()), None)
+    return next((Driver(name, coordinate, value / w) for coordinate, w in kept.items()), "its coefficients cancel")

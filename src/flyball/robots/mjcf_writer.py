@@ -9,7 +9,6 @@ bodies would differ.
 
 from __future__ import annotations
 
-import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -50,34 +49,31 @@ from ..tables.structure import Choices, structure
 from ..tables.structure_definition import FrameSpec, velocity_names
 from ..tables.table_definitions import FREE, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL
 from ..tables.values import values
+from .robot_file import (
+    UNLIMITED,
+    Names,
+    control_of,
+    coupling_numbers,
+    numbers_text,
+    omitted_elements,
+    shared_controls,
+)
 
 CLOSED_BY_EQUALITIES = (Spherical, Fixed, Revolute)
 """Joints that may close loops: connect, weld, and connect at two points of the axis."""
-HARDEST = {"solimp": "0.9999 0.9999 0.001 0.5 2"}
+EQUALITY_IMPEDANCE = {"solimp": "0.9999 0.9999 0.001 0.5 2"}
 """Impedance of equalities: the largest of MuJoCo (mjMAXIMP)."""
-UNLIMITED = 1e9
-"""Bound of a joint or tendon with one stop, for MJCF limits them on both sides [rad or m]."""
+WORLD = "world"
+"""Name of ground in MJCF, which no other body can have."""
 SMALLEST_INERTIA = 1e-15
 """Mass and moments of inertia that MuJoCo demands of bodies that move (mjMINVAL)."""
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-CONTROL = re.compile(
-    rf"(?:(?P<gear>{NUMBER})\*(?P<open>\())?(?:(?P<gain>{NUMBER})\*)?(?P<control>[A-Za-z_]\w*)(?(open)\))"
-)
-"""Laws of actuators that have a counterpart: a parameter, or gear*(gain*parameter), as the reader writes them."""
+ADDITIVE = {"damping", "frictionloss", "armature"}
+"""Attributes of a joint that add up over several elements; others of a second element are those of a tendon."""
 PARAMETER_LAWS = "its law is not a multiple of a parameter"
 SPRINGS = (CoordinateSpring, TorsionalSpringDamper, SpringDamper, PathSpring)
 GEOMS: dict[type, str] = {Box: "box", Sphere: "sphere", Capsule: "capsule", Cylinder: "cylinder", Rod: "cylinder",
                           Ellipsoid: "ellipsoid", Plane: "plane"}  # fmt: skip
 """Shapes with a geom of their own; others are written as meshes."""
-REASONS = {
-    **dict.fromkeys(("materials", "material_pairs", "contacts", "bulk"), "contact is not written"),
-    **dict.fromkeys(("tables", "controllers"), "the file has no laws"),
-    "sensors": "the file describes the motion only",
-    "events": "the file has no events",
-    "drivers": "the format prescribes no motion",
-    "initial": "the file starts at the reference configuration",
-}
-"""Why elements of a category are left out."""
 
 
 def save_mjcf(model: Model, path: Path) -> None:
@@ -109,13 +105,15 @@ class _Writer:
         self.tags: dict[str, ET.Element] = {}  # by body
         self.root = ET.Element("mujoco", model=model.name)
         ET.SubElement(self.root, "compiler", angle="radian", autolimits="true")
-        ET.SubElement(self.root, "option", gravity=_row(self.values.system.gravity))
+        ET.SubElement(self.root, "option", gravity=numbers_text(self.values.system.gravity))
         self.places = self._drawn_joints()
         self.joint_tags: dict[int, ET.Element] = {}  # by row
         self.assets, self.tendons, self.equalities, self.actuators = (
             ET.Element(x) for x in ("asset", "tendon", "equality", "actuator")
         )
-        self.controls: list[float] = []
+        self.names = Names(e.name for e in model.elements())
+        self.not_world = self.names.new(f"{WORLD}_")
+        self.motors: list[tuple[Element, str]] = []  # with the parameter that is the control
 
     def text(self) -> str:
         """The file."""
@@ -128,8 +126,9 @@ class _Writer:
             self._force(e)
         parts = (self.assets, world, self.tendons, self.equalities, self.actuators)
         self.root.extend(x for x in parts if len(x) or x is world)
-        if any(self.controls):  # MuJoCo's controls are zero but for keyframes
-            ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="as described", ctrl=_row(self.controls))
+        controls = [float(self.values.env[parameter]) for _, parameter in self.motors]
+        if any(controls):  # MuJoCo's controls are zero but for keyframes
+            ET.SubElement(ET.SubElement(self.root, "keyframe"), "key", name="as described", ctrl=numbers_text(controls))
         self._report()
         ET.indent(self.root)
         return '<?xml version="1.0"?>\n' + ET.tostring(self.root, encoding="unicode") + "\n"
@@ -167,12 +166,18 @@ class _Writer:
                 continue
             name = names[b]
             T = np.linalg.inv(self._pose(carrier)) @ self._pose(name)
-            tag = self.tags[name] = ET.SubElement(above, "body", {"name": name} | _placed(T))
+            if name == WORLD:
+                self.missing.append(f"the name of Body {name!r} (MuJoCo's of ground; {self.not_world} in the file)")
+            tag = self.tags[name] = ET.SubElement(above, "body", {"name": self._body_name(name)} | _placed(T))
             for row in joints:
                 self._joint(tag, name, row)
             self._inertial(tag, name, any(tree.nv[row] for row in joints) or len(joints) > 1)
             self._carried(tag, name)
             tags[b] = tag, name, []
+
+    def _body_name(self, name: str) -> str:
+        """Name of a body in the file."""
+        return self.not_world if name == WORLD else name
 
     def _is_link(self, name: str) -> bool:
         """Whether a body only connects joints: it has no mass, shape, frame or end of a force, and closes no loop."""
@@ -197,7 +202,7 @@ class _Writer:
         R = self._pose(body)[:3, :3].T
         p = R @ (at - self._pose(body)[:3, 3])
         if kind == FREE:
-            ET.SubElement(tag, "freejoint", name=f"{body}_free")
+            ET.SubElement(tag, "freejoint", name=self.names.new(f"{body}_free"))
             return
         steps = {REVOLUTE: [("hinge", 2)], PRISMATIC: [("slide", 2)], SPHERICAL: [("ball", 2)],
                  PLANAR: [("slide", 0), ("slide", 1), ("hinge", 2)],
@@ -206,9 +211,13 @@ class _Writer:
             name = velocity_names(self.s)[int(S.tree.v[b]) + k].name
             owner = name.partition(".")[0]
             alone = what == "ball" or sum(x.name.startswith(f"{owner}.") for x in velocity_names(self.s)) == 1
-            given = {"name": owner if alone else re.sub(r"\W", "_", name), "type": what, "pos": _row(p)}
+            given = {
+                "name": owner if alone else self.names.new(name.replace(".", "_")),
+                "type": what,
+                "pos": numbers_text(p),
+            }
             if what != "ball":
-                given |= {"axis": _row(R @ axes[:, axis]), "ref": repr(float(S.bodies.offset[b]))}
+                given |= {"axis": numbers_text(R @ axes[:, axis]), "ref": repr(float(S.bodies.offset[b]))}
             found = ET.SubElement(tag, "joint", given)
             if len(steps) == 1:
                 self.joint_tags[b] = found
@@ -230,7 +239,7 @@ class _Writer:
                 f"has no such bodies"
             )
         axes[:, 0] *= np.sign(np.linalg.det(axes))
-        given = {"mass": repr(float(found.mass)), "diaginertia": _row(np.maximum(moments, 0.0))}
+        given = {"mass": repr(float(found.mass)), "diaginertia": numbers_text(np.maximum(moments, 0.0))}
         place = np.eye(4)
         place[:3, 3], place[:3, :3] = found.com, axes
         ET.SubElement(tag, "inertial", given | _placed(place))
@@ -260,13 +269,13 @@ class _Writer:
         T, given = np.eye(4), {"type": GEOMS.get(type(s), "mesh")}
         T[:3, 3], T[:3, :3] = s.pose(n)
         if type(s) in GEOMS:
-            given["size"] = _row(_size(s, n))
+            given["size"] = numbers_text(_size(s, n))
         else:
             v, f = s.surface(n)
             name = f"mesh{len(self.assets)}"
             faces = " ".join(map(str, np.ravel(f).tolist()))
             # MuJoCo demands a closed surface unless the inertia is that of a shell; it is not used
-            ET.SubElement(self.assets, "mesh", name=name, vertex=_row(np.ravel(v)), face=faces, inertia="shell")
+            ET.SubElement(self.assets, "mesh", name=name, vertex=numbers_text(np.ravel(v)), face=faces, inertia="shell")
             given["mesh"] = name
         ET.SubElement(tag, "geom", given | {"contype": "0", "conaffinity": "0", "mass": "0"} | _placed(place @ T))
 
@@ -287,14 +296,16 @@ class _Writer:
         row = self._row_of(e.coordinate_text()) if isinstance(e, CoordinateForce) else None
         tag = None if row is None else self.joint_tags[row]
         lower, upper = given.pop("rest", (0.0, 0.0))
-        named = {k: _row(x) for k, x in given.items()}
-        if tag is not None and lower == upper and not set(given) & set(tag.attrib):
-            tag.attrib.update(named | ({"springref": _row([lower])} if "stiffness" in given else {}))
+        if tag is not None and lower == upper and not (set(given) - ADDITIVE) & set(tag.attrib):
+            given |= {k: [float(tag.attrib[k]) + given[k][0]] for k in set(given) & set(tag.attrib)}
+            named = {k: numbers_text(x) for k, x in given.items()}
+            tag.attrib.update(named | ({"springref": numbers_text([lower])} if "stiffness" in given else {}))
         else:
             tag = self._tendon(e, n)
             if tag is None:
                 return
-            tag.attrib.update(named | ({"springlength": _row([lower, upper])} if "stiffness" in given else {}))
+            named = {k: numbers_text(x) for k, x in given.items()}
+            tag.attrib.update(named | ({"springlength": numbers_text([lower, upper])} if "stiffness" in given else {}))
         self.written.add(e.name)
         if getattr(n, "restitution", None):
             self.missing.append(f"the restitution of {e.title} (stops are soft in MuJoCo)")
@@ -304,7 +315,7 @@ class _Writer:
             gear = -gear if isinstance(e, SpringDamper | PathSpring) else gear
             on = "joint" if tag.tag == "joint" else "tendon"
             ET.SubElement(self.actuators, "motor", {"name": e.name, on: tag.attrib["name"], "gear": repr(gear)})
-            self.controls.append(float(self.values.env[parameter]))
+            self.motors.append((e, parameter))
 
     def _tendon(self, e: Force, n: Any) -> ET.Element | None:
         """A new tendon along the coordinates or the path of an element; None, with the reason, if there is none."""
@@ -315,7 +326,7 @@ class _Writer:
             p, R, carrier = self.poses.world(FrameSpec(0, e, role))
             place = np.eye(4)
             place[:3, 3], place[:3, :3] = np.real(p), np.real(R)
-            site = f"{e.name}_{k}"
+            site = self.names.new(f"{e.name}_{k}")
             T = np.linalg.inv(self._pose(carrier)) @ place
             ET.SubElement(self.tags[carrier], "site", {"name": site} | _placed(T))
             ET.SubElement(found, "site", site=site)
@@ -329,7 +340,7 @@ class _Writer:
             return None
         found = ET.SubElement(self.tendons, "fixed", name=e.name)
         for row, w in zip(rows, weights, strict=True):
-            ET.SubElement(found, "joint", joint=self.joint_tags[row].attrib["name"], coef=_row([w]))  # type: ignore[index]
+            ET.SubElement(found, "joint", joint=self.joint_tags[row].attrib["name"], coef=numbers_text([w]))  # type: ignore[index]
         return found
 
     def _closed_loops(self) -> None:
@@ -339,7 +350,8 @@ class _Writer:
             first, second = joint_bodies(self.model, e)
             if first == GROUND:
                 first, second = second, first
-            ends = {"body1": first} | ({"body2": second} if second != GROUND else {}) | HARDEST
+            ends = {f"body{k}": self._body_name(x) for k, x in enumerate((first, second), 1) if x != GROUND}
+            ends |= EQUALITY_IMPEDANCE
             if isinstance(e, Fixed):
                 ET.SubElement(self.equalities, "weld", {"name": name} | ends)
                 continue
@@ -349,8 +361,8 @@ class _Writer:
                 points.append(p + self.values.length * R[:, 2])
             for k, x in enumerate(points):
                 anchor = (np.linalg.inv(self._pose(first)) @ [*x, 1.0])[:3]
-                called = name if k == 0 else f"{name}_axis"
-                ET.SubElement(self.equalities, "connect", {"name": called, "anchor": _row(anchor)} | ends)
+                called = name if k == 0 else self.names.new(f"{name}_axis")
+                ET.SubElement(self.equalities, "connect", {"name": called, "anchor": numbers_text(anchor)} | ends)
 
     def _coupling(self, c: Any) -> None:
         """A linear relation of coordinates: of two y - y0 = c0 + c1 (x - x0), of more a tendon of constant length."""
@@ -358,26 +370,23 @@ class _Writer:
         if len(at) < len(c.coupled()):
             other = next(text for text in c.coupled() if self._row_of(text) is None)
             raise ModelError(f"{c.title} has no counterpart in MJCF: {other} is not the coordinate of a hinge or slide")
-        n, offset = self.numbers[c.name], self.values.system.bodies.offset
-        factors = np.array(c.factors(n, self.model, self.poses.axis), float)
-        factors /= factors[0]
-        total = c.total(n)
-        c0 = 0.0 if total is None else float(total) / c.first_weight(n) - float(factors @ offset[at])
+        n = self.numbers[c.name]
+        given = c.factors(n, self.model, self.poses.axis)
+        factors, c0 = coupling_numbers(c, n, given, self.values.system.bodies.offset[at])
         names = {f"joint{k}": self.joint_tags[row].attrib["name"] for k, row in enumerate(at, 1)}
         if len(at) == 2:
-            given = {"name": c.name, "polycoef": _row((c0, -factors[1], 0, 0, 0))} | names
-            ET.SubElement(self.equalities, "joint", given | HARDEST)
+            given = {"name": c.name, "polycoef": numbers_text((c0, -factors[1], 0, 0, 0))} | names
+            ET.SubElement(self.equalities, "joint", given | EQUALITY_IMPEDANCE)
         else:
             self._fixed_tendon(c, c.coupled(), factors)
-            given = {"name": c.name, "tendon1": c.name, "polycoef": _row((c0, 0, 0, 0, 0))}
-            ET.SubElement(self.equalities, "tendon", given | HARDEST)
+            given = {"name": c.name, "tendon1": c.name, "polycoef": numbers_text((c0, 0, 0, 0, 0))}
+            ET.SubElement(self.equalities, "tendon", given | EQUALITY_IMPEDANCE)
         self.written.add(c.name)
 
     def _report(self) -> None:
-        rest = left_out(self.model, self.written, self.reasons)
-        if rest or self.missing:
-            listed = ", ".join([*rest, *self.missing])
-            warn_user(f"MJCF has no counterpart of {listed}; the file lacks them", ModelWarning)
+        rest = [*omitted_elements(self.model, self.written, self.reasons), *self.missing, *shared_controls(self.motors)]
+        if rest:
+            warn_user(f"MJCF has no counterpart of {', '.join(rest)}; the file lacks them", ModelWarning)
 
 
 def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
@@ -406,24 +415,6 @@ def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
             names = ", ".join(x.__name__ for x in CLOSED_BY_EQUALITIES)
             raise ModelError(f"{j.title} closes a loop; MJCF can close loops by {names}")
     return [j.name for j in model.joints if j.name in tree], cut
-
-
-def left_out(model: Model, written: set[str], reasons: dict[str, str]) -> list[str]:
-    """Title and reason of each element that was not written."""
-    rest = [e for e in model.elements() if e.name not in written]
-    return [f"{e.title} ({reasons.get(e.name) or REASONS[e.category]})" for e in rest]
-
-
-def control_of(model: Model, e: Element) -> tuple[float, str] | None:
-    """Factor and parameter of an element that is a motor; None of any other."""
-    if not isinstance(e, Actuator | Motor | CoordinateSpring | SpringDamper | PathSpring):
-        return None
-    law = e.laws()[0]
-    found = CONTROL.fullmatch(law.replace(" ", "")) if isinstance(law, str) else None
-    only = getattr(e, "stiffness", 0.0) == 0.0 == getattr(e, "damping", 0.0)
-    if found is None or not only or found["control"] not in model.parameters:
-        return None
-    return float(found["gear"] or 1.0) * float(found["gain"] or 1.0), found["control"]
 
 
 def attributes_of(e: Element, n: Any, separation: float) -> dict[str, Any] | str:
@@ -465,9 +456,5 @@ def _size(s: Any, n: Any) -> tuple[float, ...]:
     return float(radius), *(float(x) / 2 for x in length)
 
 
-def _row(x: Any) -> str:
-    return " ".join(repr(float(y)) for y in x)
-
-
 def _placed(T: np.ndarray) -> dict[str, str]:
-    return {"pos": _row(T[:3, 3]), "quat": _row(matrix_to_quaternion(T[:3, :3]))}
+    return {"pos": numbers_text(T[:3, 3]), "quat": numbers_text(matrix_to_quaternion(T[:3, :3]))}

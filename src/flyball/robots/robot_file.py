@@ -1,4 +1,4 @@
-"""An XML file of a robot: elements that know their line, required attributes, numbers, poses, shapes."""
+"""What readers and writers of robot files share: XML that knows its lines, names, stops, motors, omissions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import os
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
@@ -14,7 +14,14 @@ from xml.parsers import expat
 import numpy as np
 
 from ..errors import ModelError
-from ..model.element import resolve
+from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.limit import Limit
+from ..forces.motor import Motor
+from ..forces.path_spring import PathSpring
+from ..forces.spring_damper import SpringDamper
+from ..model.body import Initial
+from ..model.element import Element, resolve
+from ..model.model import Model
 from ..model.shapes.box import Box
 from ..model.shapes.cylinder import Cylinder
 from ..model.shapes.mesh import MESH_FORMATS, Mesh
@@ -23,6 +30,24 @@ from ..model.shapes.sphere import Sphere
 
 ONCE = {"inertial", "origin", "mass", "inertia", "geometry", "parent", "child", "axis", "limit", "dynamics", "mimic"}
 """Tags of which a link, a joint, or a tag in them has one."""
+ROUNDING = 1e-9
+"""Of numbers in files, relative to the largest of their kind."""
+UNLIMITED = 1e9
+"""Written where a format demands a bound and the mechanism has none [SI units]; read as no bound."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+CONTROL = re.compile(
+    rf"(?:(?P<gear>{NUMBER})\*(?P<open>\())?(?:(?P<gain>{NUMBER})\*)?(?P<control>[A-Za-z_]\w*)(?(open)\))"
+)
+"""Laws of actuators that have a counterpart: a parameter, or gear*(gain*parameter), as the reader writes them."""
+REASONS = {
+    **dict.fromkeys(("materials", "material_pairs", "contacts", "bulk"), "contact is not written"),
+    **dict.fromkeys(("tables", "controllers"), "the file has no laws"),
+    "sensors": "the file describes the motion only",
+    "events": "the file has no events",
+    "drivers": "the format prescribes no motion",
+    "initial": "the file starts at the reference configuration",
+}
+"""Why elements of a category are not written."""
 
 
 class _Element(ET.Element):
@@ -207,3 +232,73 @@ def line_of(tag: ET.Element) -> int:
 def rows(R: np.ndarray) -> tuple[tuple[float, ...], ...]:
     """A matrix as tuples of its rows."""
     return tuple(tuple(row) for row in R.tolist())
+
+
+class Names:
+    """Names of one file or mechanism, each of which is given once."""
+
+    def __init__(self, given: Iterable[str]) -> None:
+        self.given = set(given)
+
+    def new(self, wanted: str) -> str:
+        """Return the name, with underscores added if it has been given before."""
+        while wanted in self.given:
+            wanted += "_"
+        self.given.add(wanted)
+        return wanted
+
+    def new_identifier(self, wanted: str) -> str:
+        """Return the same, with other characters where Python permits none."""
+        plain = re.sub(r"\W", "_", wanted)
+        return self.new(plain if plain.isidentifier() else f"_{plain}")
+
+
+def numbers_text(x: Any) -> str:
+    """Return numbers as an attribute, from which they are read to the last bit."""
+    return " ".join(repr(float(y)) for y in x)
+
+
+def stops(name: Callable[[], str], lower: float, upper: float, **along: Any) -> Iterator[Limit]:
+    """Yield the stops between two bounds, without those that are `UNLIMITED`; nothing if both are."""
+    bounds: dict[str, Any] = {k: x for k, x in (("lower", lower), ("upper", upper)) if abs(x) < UNLIMITED}
+    if bounds:
+        yield Limit(name(), **along, **bounds)
+
+
+def initial_in_range(along: str, lower: float, upper: float, drawn: float) -> Iterator[Initial]:
+    """Yield an initial value in the middle of a range, or at its only bound, if the drawn one is not permitted."""
+    if not lower <= drawn <= upper:
+        bounds = [x for x in (lower, upper) if abs(x) < UNLIMITED]
+        yield Initial(along, value=sum(bounds) / len(bounds))
+
+
+def omitted_elements(model: Model, written: set[str], reasons: Mapping[str, str]) -> list[str]:
+    """Return title and reason of each element that was not written."""
+    rest = [e for e in model.elements() if e.name not in written]
+    return [f"{e.title} ({reasons.get(e.name) or REASONS[e.category]})" for e in rest]
+
+
+def control_of(model: Model, e: Element) -> tuple[float, str] | None:
+    """Return factor and parameter of an element that is a motor; None of any other."""
+    if not isinstance(e, Actuator | Motor | CoordinateSpring | SpringDamper | PathSpring):
+        return None
+    law = e.laws()[0]
+    found = CONTROL.fullmatch(law.replace(" ", "")) if isinstance(law, str) else None
+    only = getattr(e, "stiffness", 0.0) == 0.0 == getattr(e, "damping", 0.0)
+    if found is None or not only or found["control"] not in model.parameters:
+        return None
+    return float(found["gear"] or 1.0) * float(found["gain"] or 1.0), found["control"]
+
+
+def shared_controls(motors: Iterable[tuple[Element, str]]) -> list[str]:
+    """Return what is lost of parameters that drive several motors, for a file has one control for each motor."""
+    titles: dict[str, list[str]] = {}
+    for e, parameter in motors:
+        titles.setdefault(parameter, []).append(e.title)
+    return [f"the one parameter {k!r} of {' and '.join(v)}" for k, v in titles.items() if len(v) > 1]
+
+
+def coupling_numbers(c: Any, n: Any, factors: Any, drawn: Any) -> tuple[np.ndarray, float]:
+    """Return f and c_0 of a coupling sum_k f_k (q_k - drawn_k) = c_0, with f_1 = 1."""
+    f, total = np.array(factors, float) / float(factors[0]), c.total(n)
+    return f, 0.0 if total is None else float(total) / float(c.first_weight(n)) - float(f @ np.asarray(drawn))

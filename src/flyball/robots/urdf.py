@@ -20,23 +20,21 @@ import numpy as np
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import Actuator, CoordinateSpring
-from ..forces.limit import Limit
 from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
 from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
 from ..joints.revolute import Revolute
-from ..model.body import GROUND, Body, Frame, Ground, Initial
+from ..model.body import GROUND, Body, Frame, Ground
 from ..model.element import Element
 from ..model.geometry import quaternion_to_matrix
 from ..model.model import Model
-from .robot_file import RobotFile, line_of, rows
+from .robot_file import ROUNDING, UNLIMITED, Names, RobotFile, initial_in_range, line_of, rows, stops
 
 T = TypeVar("T", bound=Model)
 
 STANDARD_GRAVITY = 9.80665
 """Of a robot that is read, along -z [m/s^2]: URDF has none."""
-ROUNDING = 1e-9  # of principal moments, relative to the largest: files round their numbers
 MAX_LISTED = 3  # of lines or files in a warning
 
 COORDINATES = {"revolute": "angle", "continuous": "angle", "prismatic": "displacement"}
@@ -117,7 +115,8 @@ class _Reader(RobotFile):
         self.links = self._named("link")
         self.joints = [self._joint(tag) for tag in self._named("joint").values()]
         self._fix_at_equal_limits()
-        self.names: dict[str, str] = {}
+        self.names = Names({GROUND})
+        self.joint_names: dict[str, str] = {}  # here, by those in the file
         self.unused: dict[str, list[int]] = {}
         self.raised: list[str] = []
         self.renamed: list[str] = []
@@ -206,14 +205,9 @@ class _Reader(RobotFile):
 
     def name(self, wanted: str) -> str:
         """A name that flyball permits and that is not taken."""
-        plain = re.sub(r"\W", "_", wanted)
-        plain = plain if plain.isidentifier() else f"_{plain}"
-        taken = set(self.names.values())
-        while plain in taken or plain == GROUND:
-            plain += "_"
+        plain = self.names.new_identifier(wanted)
         if plain != wanted:
             self.renamed.append(f"{wanted} is {plain}")
-        self.names[f"{wanted} {len(taken)}"] = plain
         return plain
 
     def _add_link(self, m: Model, link: str, rigid: str | None, below: dict[str, list[_Joint]]) -> None:
@@ -285,7 +279,7 @@ class _Reader(RobotFile):
         ends = self.carrier[j.parent], self.carrier[j.child]
         at, axis = tuple(T[:3, 3]), tuple(T[:3, :3] @ j.axis)
         name = self.name(j.name)
-        self.names[j.name] = name
+        self.joint_names[j.name] = name
         if j.kind == "fixed":
             yield Fixed(name, *ends, at=at)
         elif j.kind == "planar":
@@ -301,7 +295,7 @@ class _Reader(RobotFile):
             if j.kind == "planar" and (j.tag.find("limit") is not None or j.tag.find("dynamics") is not None):
                 self.unused.setdefault("limit and dynamics of a planar joint", []).append(line_of(j.tag))
             return
-        name = self.names[j.name]
+        name = self.joint_names[j.name]
         along = f"{name}.{COORDINATES[j.kind]}"
         limit, losses = j.tag.find("limit"), j.tag.find("dynamics")
         if j.kind == "continuous" and limit is not None and {"lower", "upper"} & set(limit.attrib):
@@ -312,10 +306,8 @@ class _Reader(RobotFile):
             lower, upper = self.number(limit, "lower", "0"), self.number(limit, "upper", "0")
             if lower > upper:
                 self.fail(limit, f"the limits of joint {j.name!r} are reversed: {lower:g} to {upper:g}")
-            if lower < upper:  # equal ends fix the joint: see `_fix_at_equal_limits`
-                yield Limit(self.name(f"{name}_limit"), along, lower=lower, upper=upper)
-            if not lower <= 0.0 <= upper:
-                yield Initial(along, value=0.5 * (lower + upper))
+            yield from stops(lambda: self.name(f"{name}_limit"), lower, upper, coordinate=along)
+            yield from initial_in_range(along, lower, upper, 0.0)
         damping, friction = (self.number(losses, x, "0") for x in ("damping", "friction"))
         for value, what in ((damping, "damping"), (friction, "friction")):
             if value < 0.0:
@@ -344,8 +336,10 @@ class _Reader(RobotFile):
             if factor == 0.0:
                 self.fail(tag, f"the multiplier of joint {j.name!r} is 0, so that it follows nothing; make it fixed")
             self._refuse_circles(j)
-            ends = [f"{self.names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
-            yield Coupler(self.name(f"{self.names[j.name]}_mimic"), tuple(ends), weights=(1.0, -factor), value=offset)
+            ends = [f"{self.joint_names[k]}.{COORDINATES[kinds[k]]}" for k in (j.name, other)]
+            yield Coupler(
+                self.name(f"{self.joint_names[j.name]}_mimic"), tuple(ends), weights=(1.0, -factor), value=offset
+            )
 
     def _refuse_circles(self, j: _Joint) -> None:
         """Refuse a joint that follows itself, through others perhaps."""
@@ -387,7 +381,7 @@ class _Reader(RobotFile):
             given = self.attribute(actuator, "name")
             called, control = self.name(given), self.name(re.sub(r"\W", "_", f"control_{given}"))
             parameters[control] = 0.0
-            along = f"{self.names[moved]}.{COORDINATES[kinds[moved]]}"
+            along = f"{self.joint_names[moved]}.{COORDINATES[kinds[moved]]}"
             yield Actuator(called, along, force=f"{reduction!r}*{control}")
 
     def _only(self, transmission: ET.Element, role: str) -> ET.Element:
@@ -435,8 +429,9 @@ class _Reader(RobotFile):
 
     def _note_unused(self, tag: ET.Element) -> None:
         known = UNDERSTOOD.get(tag.tag, set())
-        for name in tag.attrib:
-            if name not in known and not name.startswith("xmlns"):
+        for name, value in tag.attrib.items():
+            unlimited = tag.tag == "limit" and value == repr(UNLIMITED)  # as `save_urdf` writes it
+            if name not in known and not name.startswith("xmlns") and not unlimited:
                 self.unused.setdefault(f"{tag.tag} {name}", []).append(line_of(tag))
         for x in tag:
             if x.tag == "transmission":

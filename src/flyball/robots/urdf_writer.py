@@ -7,7 +7,6 @@ format cannot express is listed in a `ModelWarning` with the reason, or refused 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
 from ..forces.coordinate_spring import CoordinateSpring
 from ..forces.limit import Limit
-from ..joints.coupler import Coupler
 from ..joints.fixed import Fixed
 from ..joints.planar import Planar
 from ..joints.prismatic import Prismatic
@@ -37,12 +35,10 @@ from ..tables.element_numbers import element_numbers
 from ..tables.forest import TreeBody, tree_bodies
 from ..tables.structure import structure
 from ..tables.values import values
-from .mjcf_writer import control_of, left_out
+from .robot_file import UNLIMITED, Names, control_of, coupling_numbers, numbers_text, omitted_elements, shared_controls
 from .urdf import COORDINATES, SIMPLE, STANDARD_GRAVITY
 
 TYPES: dict[type[Joint], str] = {Revolute: "revolute", Prismatic: "prismatic", Fixed: "fixed", Planar: "planar"}
-UNLIMITED = 1e9
-"""Bound of a prismatic joint without stops, which URDF always limits [m]."""
 
 
 def save_urdf(model: Model, path: Path) -> None:
@@ -79,9 +75,14 @@ class _Writer:
         other = "URDF has damping and friction of joints and simple transmissions"
         self.reasons = dict.fromkeys((e.name for e in model.forces), other)
         self.reasons |= dict.fromkeys((e.name for e in model.limits), "URDF has rigid stops of joints")
-        self.reasons |= dict.fromkeys((e.name for e in model.couplings), "URDF couples two coordinates of joints")
+        self.reasons |= dict.fromkeys(
+            (e.name for e in model.couplings), "URDF couples two revolute or prismatic joints"
+        )
         self.reasons |= dict.fromkeys((e.name for e in model.ground), "ground has no shapes in URDF")
+        self.names = Names(e.name for e in model.elements())
         self.ground = self._ground_link()
+        self.mimics = self._mimics()
+        self.motors: list[tuple[Element, str]] = []  # with the parameter that is the control
         self.robot = ET.Element("robot", name=model.name)
 
     def _ground_link(self) -> str:
@@ -90,10 +91,7 @@ class _Writer:
             p, R = self.poses.named(e.name)
             if e.body == GROUND and not p.any() and (np.eye(3) == R).all():
                 return e.name
-        name = "world"
-        while self.model.find(name) is not None:
-            name += "_"
-        return name
+        return self.names.new("world")
 
     def text(self) -> str:
         """The file."""
@@ -144,6 +142,8 @@ class _Writer:
         upper = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), J[np.triu_indices(3)].tolist(), strict=True)
         ET.SubElement(inertial, "inertia", {k: repr(x) for k, x in upper})
         self.written.add(name)
+        if body.velocity is not None or body.angular_velocity is not None:
+            self.missing.append(f"the initial velocity of {name}")
         for s, n, _ in checked_shapes(body, self.env, False):
             self._shape(link, name, s, n)
 
@@ -152,14 +152,14 @@ class _Writer:
         if s.hole:  # not drawn, and its mass is that of the body
             return
         if isinstance(s, Box):
-            ET.SubElement(geometry, "box", size=_row(n.edges))
+            ET.SubElement(geometry, "box", size=numbers_text(n.edges))
         elif type(s) in (Cylinder, Rod):
             radius, length = (repr(float(x)) for x in s.size(n))
             ET.SubElement(geometry, "cylinder", radius=radius, length=length)
         elif isinstance(s, Sphere):
             ET.SubElement(geometry, "sphere", radius=repr(float(n.radius)))
         elif isinstance(s, Mesh) and s.path is not None:
-            ET.SubElement(geometry, "mesh", filename=s.path, scale=_row([n.scale] * 3))
+            ET.SubElement(geometry, "mesh", filename=s.path, scale=numbers_text([n.scale] * 3))
         else:
             self.missing.append(f"{s.title} of {name} (URDF has boxes, cylinders, spheres and mesh files)")
             return
@@ -171,7 +171,9 @@ class _Writer:
     def _joint(self, t: TreeBody) -> None:
         e, kind = t.joint, TYPES[type(t.joint)]  # type: ignore[index]
         assert e is not None
-        if kind == "revolute" and not any(x.coordinate == f"{e.name}.angle" for x in self._limits()):
+        along = f"{e.name}.{COORDINATES.get(kind, '')}"
+        lower, upper = self._range(along)
+        if kind == "revolute" and lower == -UNLIMITED and upper == UNLIMITED:
             kind = "continuous"
         joint = ET.SubElement(self.robot, "joint", name=e.name, type=kind)
         parent = self.ground if t.parent == GROUND else t.parent
@@ -181,68 +183,107 @@ class _Writer:
         if kind == "fixed":
             return
         axis = self.place[t.body][:3, :3].T @ self.poses.ends(e)[0][1][:, 2]
-        ET.SubElement(joint, "axis", xyz=_row(-axis if t.reversed else axis))
+        ET.SubElement(joint, "axis", xyz=numbers_text(-axis if t.reversed else axis))
+        drawn = float(getattr(self.numbers[e.name], "angle" if kind == "planar" else COORDINATES[kind], 0.0))
+        if drawn:
+            self.missing.append(f"the value {drawn:g} of {e.title} in the reference configuration (0 in URDF)")
         if kind not in COORDINATES:
             return
-        along = f"{e.name}.{COORDINATES[kind]}"
-        drawn = float(getattr(self.numbers[e.name], COORDINATES[kind], 0.0))  # URDF's value is 0 there
-        if kind != "continuous":
-            lower, upper = self._range(along)
-            limit = {"lower": repr(lower - drawn), "upper": repr(upper - drawn), "effort": "0", "velocity": "0"}
-            ET.SubElement(joint, "limit", limit)
-        losses = {
-            "damping": self._loss(along, CoordinateSpring, "damping"),
-            "friction": self._loss(along, Brake, "capacity"),
-        }
+        if kind != "continuous":  # URDF demands an effort and a velocity too
+            bounds = {k: x if abs(x) == UNLIMITED else x - drawn for k, x in (("lower", lower), ("upper", upper))}
+            limit = bounds | {"effort": UNLIMITED, "velocity": UNLIMITED}
+            ET.SubElement(joint, "limit", {k: repr(x) for k, x in limit.items()})
+        losses = {"damping": self._damping(along), "friction": self._friction(along)}
         if any(losses.values()):
             ET.SubElement(joint, "dynamics", {k: repr(x) for k, x in losses.items()})
-        for c in self.model.couplings:
-            if isinstance(c, Coupler) and c.coordinates[0] == along and len(c.coordinates) == 2:
-                n = self.numbers[c.name]
-                a, b = (float(x) for x in n.weights)
-                other, _, what = c.coordinates[1].partition(".")
-                of_other = float(getattr(self.numbers[other], what, 0.0))
-                offset = 0.0 if n.value is None else (float(n.value) - a * drawn - b * of_other) / a
-                mimic = {"joint": other, "multiplier": repr(-b / a), "offset": repr(offset)}
-                ET.SubElement(joint, "mimic", mimic)
-                self.written.add(c.name)
+        if along in self.mimics:
+            c, other, multiplier, offset = self.mimics[along]
+            mimic = {"joint": other, "multiplier": repr(multiplier), "offset": repr(offset)}
+            ET.SubElement(joint, "mimic", mimic)
+            self.written.add(c)
 
-    def _limits(self) -> Iterable[Limit]:
-        return (x for x in self.model.limits if isinstance(x, Limit))
+    def _drawn(self, along: str) -> float | None:
+        """Value of a coordinate in the reference configuration; None unless a joint of URDF has this coordinate."""
+        joint, _, what = along.partition(".")
+        kind = TYPES.get(type(self.model.find(joint)))  # type: ignore[arg-type]
+        return float(getattr(self.numbers[joint], what)) if what and COORDINATES.get(kind or "") == what else None
+
+    def _mimics(self) -> dict[str, tuple[str, str, float, float]]:
+        """Name of the coupling, joint that is followed, multiplier and offset of each coordinate that follows another.
+
+        A joint follows one other joint, and none itself: each tree of couplings begins at one that follows none.
+        """
+        found: dict[str, tuple[str, str, float, float]] = {}
+        reached = set[str]()
+        waiting = [c for c in self.model.couplings if len(c.coupled()) == 2]
+        waiting = [c for c in waiting if all(self._drawn(x) is not None for x in c.coupled())]
+        while waiting:
+            c = next((c for c in waiting if len(reached & set(c.coupled())) == 1), waiting[0])
+            waiting.remove(c)
+            first, second = c.coupled()
+            if {first, second} <= reached:
+                self.reasons[c.name] = "other couplings relate these coordinates already"
+                continue
+            n = self.numbers[c.name]
+            drawn = [self._drawn(first), self._drawn(second)]
+            (_, f), c0 = coupling_numbers(c, n, c.factors(n, self.model, self.poses.axis), drawn)
+            follower, other, multiplier, offset = (first, second, -f, c0)
+            if first in reached:
+                follower, other, multiplier, offset = (second, first, -1.0 / f, c0 / f)
+            found[follower] = c.name, other.partition(".")[0], float(multiplier), float(offset)
+            reached |= {first, second}
+        return found
 
     def _range(self, along: str) -> tuple[float, float]:
+        """The bounds of all rigid stops of a coordinate."""
         lower, upper = -UNLIMITED, UNLIMITED
-        for e in self._limits():
-            if e.coordinate == along and e.stiffness is None:
+        for e in self.model.limits:
+            if isinstance(e, Limit) and e.coordinate == along and e.stiffness is None:
                 n = self.numbers[e.name]
                 lower = max(lower, -UNLIMITED if n.lower is None else float(n.lower))
                 upper = min(upper, UNLIMITED if n.upper is None else float(n.upper))
                 self.written.add(e.name)
+                if n.restitution:
+                    self.missing.append(f"the restitution of {e.title} (stops have none in URDF)")
         return lower, upper
 
-    def _loss(self, along: str, kind: type[Element], field: str) -> float:
-        """Sum of the numbers of one kind of force along a coordinate."""
-        total = 0.0
-        for e in self.model.forces:
-            if type(e) is kind and getattr(e, "coordinate", "") == along:
-                n = self.numbers[e.name]
-                value = getattr(n, field)
-                plain = kind is not CoordinateSpring or (n.stiffness == 0.0 and n.force is None)
-                if isinstance(value, (int, float)) and plain:
-                    total += float(value)
-                    self.written.add(e.name)
-        return total
+    def _damping(self, along: str) -> float:
+        """Sum of the dampers of a coordinate; one with a spring or a law is not written."""
+        found = [
+            (e, self.numbers[e.name])
+            for e in self.model.forces
+            if type(e) is CoordinateSpring and e.coordinate == along and e.force is None
+        ]
+        return self._sum({e.name: n.damping for e, n in found if n.stiffness == 0.0})
+
+    def _friction(self, along: str) -> float:
+        """Sum of the capacities of the brakes of a coordinate; those by a law, or greater at rest, are not written."""
+        found = [e for e in self.model.forces if type(e) is Brake and e.coordinate == along]
+        given = {e.name: self.numbers[e.name] for e in found}
+        self.reasons |= dict.fromkeys(given, "friction is a number in URDF, the same at rest")
+        plain = {k: n for k, n in given.items() if isinstance(n.capacity, int | float) and n.static == 1.0}
+        return self._sum({k: n.capacity for k, n in plain.items()})
+
+    def _sum(self, given: dict[str, float]) -> float:
+        """Sum of the numbers of elements, which are written thereby."""
+        self.written |= set(given)
+        return float(sum(given.values()))
 
     def _transmissions(self) -> None:
         """Motors of joints whose torque is a multiple of a parameter, the first of each joint."""
         driven = set[str]()
         for e in self.model.forces:
-            control = control_of(self.model, e)
-            joint, _, what = getattr(e, "coordinate_text", str)().partition(".")
-            kind = TYPES.get(type(self.model.find(joint)))  # type: ignore[arg-type]
-            if control is None or COORDINATES.get(kind or "") != what or joint in driven or control[0] == 0.0:
+            control, along = control_of(self.model, e), getattr(e, "coordinate_text", str)()
+            if control is None or self._drawn(along) is None or control[0] == 0.0:
+                continue
+            joint = along.partition(".")[0]
+            if joint in driven:
+                self.reasons[e.name] = "URDF has one simple transmission a joint"
                 continue
             driven.add(joint)
+            self.motors.append((e, control[1]))
+            if value := self.env[control[1]]:
+                self.missing.append(f"the value {value:g} of the parameter {control[1]!r} of {e.title} (0 in URDF)")
             tag = ET.SubElement(self.robot, "transmission", name=f"{e.name}_transmission")
             ET.SubElement(tag, "type").text = f"transmission_interface/{SIMPLE}"
             ET.SubElement(tag, "joint", name=joint)
@@ -257,7 +298,7 @@ class _Writer:
         if e.name == self.ground:
             return
         ET.SubElement(self.robot, "link", name=e.name)
-        joint = ET.SubElement(self.robot, "joint", name=f"{e.name}_fixed", type="fixed")
+        joint = ET.SubElement(self.robot, "joint", name=self.names.new(f"{e.name}_fixed"), type="fixed")
         p, R = self.poses.named(e.name)
         T = np.eye(4)
         T[:3, 3], T[:3, :3] = p, R
@@ -266,15 +307,11 @@ class _Writer:
         ET.SubElement(joint, "child", link=e.name)
 
     def _report(self) -> None:
-        rest = left_out(self.model, self.written, self.reasons) + self.missing
+        rest = [*omitted_elements(self.model, self.written, self.reasons), *self.missing, *shared_controls(self.motors)]
         if tuple(self.model.gravity) != (0, 0, -STANDARD_GRAVITY):
             rest.append(f"gravity {tuple(self.model.gravity)} ({STANDARD_GRAVITY} m/s^2 along -z, read again)")
         if rest:
             warn_user(f"URDF has no counterpart of {', '.join(rest)}; the file lacks them", ModelWarning)
-
-
-def _row(x: Any) -> str:
-    return " ".join(repr(float(y)) for y in x)
 
 
 def _origin(tag: ET.Element, T: np.ndarray) -> None:
@@ -284,4 +321,4 @@ def _origin(tag: ET.Element, T: np.ndarray) -> None:
     yaw = np.arctan2(R[1, 0], R[0, 0])  # near a pitch of 90 deg any yaw, with the roll that belongs to it
     c, s = np.cos(yaw), np.sin(yaw)
     roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    ET.SubElement(tag, "origin", xyz=_row(T[:3, 3]), rpy=_row((roll, pitch, yaw)))
+    ET.SubElement(tag, "origin", xyz=numbers_text(T[:3, 3]), rpy=numbers_text((roll, pitch, yaw)))
