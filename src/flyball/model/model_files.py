@@ -324,18 +324,22 @@ def _make_element(category: str, table: Mapping[str, Any], where: str) -> Elemen
         _refuse(error, where)
 
 
+def element_types(category: str) -> list[str]:
+    """Return the types that the tables of a category may name; those of the user's own classes last."""
+    if category == "sensors":
+        return sorted(SENSORS)
+    base, room = MANY_KINDS[category]
+    importlib.import_module(f"..{room}", __package__)
+    kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
+    own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
+    return [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
+
+
 def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
     """Return the class named by the table's ``type``."""
     if category in DEFAULT_KINDS:
         fields.setdefault("type", DEFAULT_KINDS[category])
-    if category == "sensors":
-        known = sorted(SENSORS)
-    else:
-        base, room = MANY_KINDS[category]
-        importlib.import_module(f"..{room}", __package__)
-        kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
-        own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
-        known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
+    known = element_types(category)
     name = fields.pop("type", None)
     if category == "forces" and name == Touch.__name__:  # contact points of a motion, in its result file
         return Touch
