@@ -26,7 +26,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_fmt_rewrites_a_file_and_keeps_the_model(here):
     text = Path("four-bar.toml").read_text(encoding="utf-8")
-    Path("mine.toml").write_text(text.replace(" = ", "="), encoding="utf-8")
+    Path("mine.toml").write_text(text.replace("type = ", "type="), encoding="utf-8")
     before = fb.load("mine.toml")
     answer = said("fmt", "mine.toml", "four-bar.toml")
     assert (answer.exit_code, answer.stdout) == (0, "mine.toml is rewritten\n")
