@@ -18,13 +18,14 @@ from flyball.cli.view import SCHEMA_FILE
 from flyball.mechanism import Mechanism
 from flyball.model.model_schema import model_schema
 
+SCHEMA = json.dumps(model_schema(Mechanism), indent=1)  # made before examples define elements of their own
+
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages and the schema of model files."""
     for path, text in (reference.pages() | gallery.pages()).items():
         files.append(File.generated(config, path, content=text))
-    schema = json.dumps(model_schema(Mechanism), indent=1)
-    files.append(File.generated(config, SCHEMA_FILE, content=schema))
+    files.append(File.generated(config, SCHEMA_FILE, content=SCHEMA))
     return files
 
 
