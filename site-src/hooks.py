@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -13,11 +14,18 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "src
 import gallery
 import reference
 
+from flyball.cli.view import SCHEMA_FILE
+from flyball.mechanism import Mechanism
+from flyball.model.model_schema import model_schema
+
+SCHEMA = json.dumps(model_schema(Mechanism), indent=1)  # made before examples define elements of their own
+
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the generated pages."""
+    """Add the generated pages and the schema of model files."""
     for path, text in (reference.pages() | gallery.pages()).items():
         files.append(File.generated(config, path, content=text))
+    files.append(File.generated(config, SCHEMA_FILE, content=SCHEMA))
     return files
 
 

@@ -33,6 +33,7 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
     Parameters
     ----------
     name : str
+        Its name, in results and messages.
     planar : bool
         Whether everything moves in the x-y plane (three velocities a body) or in space (six).
     gravity : vector [m/s^2]

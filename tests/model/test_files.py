@@ -64,14 +64,14 @@ def test_the_file_reads_well() -> None:
         'name = "slider crank"\nplanar = true\ngravity = [0, "-9.81 m/s^2"]\n\n[parameters]\nk = "2 kN/m"\n'
     )
     assert '[[joints]]\ntype = "Revolute"\nname = "A"\nbody_i = "ground"\nbody_j = "crank"\nat = [0.0, 0.0]\n' in text
-    assert 'shape = [{ type = "Box", edges = [1.0, 2.0, 3.0] }, { type = "Sphere", radius = "5 mm" }]' in text
+    assert 'shape = [{type = "Box", edges = [1.0, 2.0, 3.0]}, {type = "Sphere", radius = "5 mm"}]' in text
     assert 'force = "3*sin(t)"' in text
 
 
 def test_many_shapes_stand_one_a_line() -> None:
     m = fb.Mechanism("m")
     m.add(fb.Body("b", density=1, shape=[fb.Box(edges=(k, 1, 1), position=(k, 0, 0)) for k in (1, 2, 3)]))
-    assert dumps(m).count("\n    { type =") == 3
+    assert dumps(m).count("\n    {type =") == 3
     assert loads(dumps(m), fb.Mechanism) == m
 
 

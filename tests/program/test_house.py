@@ -32,7 +32,7 @@ class Trees(dict[Path, ast.Module]):
 TREES = Trees()
 LEAF = {"errors", "__version__"}  # may be used anywhere
 LAYERS = (  # from the foundation up: a package imports, when it is imported, only those in lines above its own
-    "compiler",
+    "compiler docstrings",
     "math",
     "numerics rotations collision",
     "constraints",
@@ -61,12 +61,12 @@ STANDS_ALONE = {  # these import no more than this of what is below them
     "collision": {"compiler", "math"},
     "constraints": {"compiler", "math", "numerics"},
     "rotations": {"math"},
-    "model": {"math", "constraints", "rotations"},
+    "model": {"docstrings", "math", "constraints", "rotations"},
     "joints": {"compiler", "math", "constraints", "model"},
     "forces": {"compiler", "math", "numerics", "constraints", "model"},
     "controllers": {"compiler", "math", "model"},
     "laws": {"compiler", "math", "model"},
-    "cli": {"mechanism_methods"},
+    "cli": {"docstrings", "mechanism_methods"},
     "mechanism": {"mechanism_methods", "model"},
 }
 LATER = {  # imports inside functions of what stands above: methods that lead from a thing to what is done with it

@@ -17,7 +17,7 @@ import flyball
 import flyball as fb
 from flyball.analysis_options import AnalysisOptions
 from flyball.cli import app
-from flyball.cli.options import argument_help, first_doc_line
+from flyball.docstrings import argument_help, first_doc_line
 from flyball.mechanism_methods import DesignMethods, MobilityMethods, MotionMethods, StaticsMethods
 from flyball.numerics.integrators.butcher_tableaux import TABLEAUX
 from flyball.sensitivity import sensitivity

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -13,6 +14,9 @@ from pathlib import Path
 import pytest
 
 import flyball as fb
+from flyball.cli.view import SCHEMA_FILE
+from flyball.model.element import Element
+from flyball.model.model_schema import DIALECT
 from tests.pages import ROOT
 
 pytest.importorskip("material", reason="the site needs MkDocs Material: pip install 'flyball[docs]'")
@@ -52,6 +56,14 @@ def test_every_example_is_in_the_gallery(site):
     for example in (p for p in (ROOT / "examples").iterdir() if p.suffix in (".toml", ".py", ".ipynb")):
         assert f'href="{example.stem}.html"' in overview
         assert f"examples/{example.name}" in (site / "gallery" / f"{example.stem}.html").read_text(encoding="utf-8")
+
+
+def test_the_site_has_the_schema_of_model_files(site):
+    published = json.loads((site / SCHEMA_FILE).read_text(encoding="utf-8"))
+    assert published["$schema"] == DIALECT
+    elements = {n for n in dir(fb) if isinstance(getattr(fb, n), type) and issubclass(getattr(fb, n), Element)}
+    assert elements <= set(published["$defs"])
+    assert "Air" not in published["$defs"]  # an element of an example's own
 
 
 class Fetched(HTMLParser):

@@ -14,13 +14,14 @@ from typing import Annotated
 import typer
 
 from . import analyses as analyses
+from . import model_files as model_files
 from . import run as run
 from . import study as study
 from . import view as view
 from .application import app
 
 COMMANDS = (
-    *("run", "check", "view", "live", "new", "compare", "kinematics", "inverse-dynamics"),
+    *("run", "check", "view", "live", "new", "fmt", "schema", "compare", "kinematics", "inverse-dynamics"),
     *("mobility", "singularities", "equilibrium", "equilibria", "linearize", "modes", "root-locus"),
     *("study", "optimize", "sensitivity", "equations", "export", "compile"),
 )

@@ -1,6 +1,6 @@
 """The command-line application: shared options, exit codes, error messages, JSON and table output.
 
-Exit codes: 0 done, 2 wrong input, 3 the analysis failed, 130 interrupted.
+Exit codes: 0 done, 1 files of another layout (``fmt --check``), 2 wrong input, 3 the analysis failed, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import typer
 
 from ..errors import AnalysisError, FlyballError, PerformanceNotice
 
-DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
+DONE, OTHER_LAYOUT, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
     name="flyball",

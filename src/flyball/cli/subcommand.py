@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+from ..docstrings import argument_help, first_doc_line
 from ..errors import ModelError
 from .application import (
     AsJson,
@@ -27,7 +28,7 @@ from .application import (
     report_errors,
     show_notices,
 )
-from .options import Option, OptionOverride, argument_help, first_doc_line, make_options, refuse_duplicate
+from .options import Option, OptionOverride, make_options, refuse_duplicate
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism

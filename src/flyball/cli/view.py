@@ -56,6 +56,8 @@ def _page_file(file: Path) -> Path:
     return page
 
 
+SCHEMA_FILE = "flyball.schema.json"
+"""The file in which `new` expects the schema of model files."""
 _PACKAGE = Path(__file__).parents[1]
 _FROM_EXAMPLES = {  # name for ``new``: file in examples/, in the wheel models/ (pyproject.toml)
     "bouncing-ball": "bouncing_ball",
@@ -91,7 +93,10 @@ def new(
     file: Annotated[Path | None, typer.Argument(help="The file to write; NAME.toml if not given.")] = None,
     list_names: Annotated[bool, typer.Option("--list", help="Print the names.")] = False,
 ) -> None:
-    """Write a commented model file to begin with; without a name, list what there is."""
+    """Write a commented model file to begin with; without a name, list what there is.
+
+    If flyball.schema.json (of flyball schema) is in the same folder, the first line names it for editors.
+    """
     with report_errors(False):
         known = model_files()
         if list_names or name is None:
@@ -108,6 +113,8 @@ def new(
             raise ModelError(f"{str(target)!r} exists and is not replaced; give another file: flyball new {name} FILE")
         source = known[name]
         text = source.read_text(encoding="utf-8").replace(f"examples/{source.name}", str(target))
+        if target.with_name(SCHEMA_FILE).is_file():
+            text = f"#:schema ./{SCHEMA_FILE}\n{text}"
         write_file(target, text.replace(f" {source.name}", f" {target}"))
         typer.echo(f"{target} is written: flyball run {target}")
 

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..model.controller import Controller, ControlState
-from ..model.element import Laws, Name, Number, element, python_data
+from ..model.element import Law, Laws, Name, Number, element, python_data
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import number
 from ..model.units import split_quantity
@@ -31,9 +31,12 @@ def _as_list(value: Any) -> Any:
     return (value,) if isinstance(value, (str, int, float)) or callable(value) else python_data(value)
 
 
-Coordinates = Annotated[tuple[str, ...], BeforeValidator(_as_list)]
-JointLaws = Annotated[Laws, BeforeValidator(_as_list)]
-Values = Annotated[tuple[tuple[str, Number], ...], BeforeValidator(_pairs)]
+Coordinates = Annotated[tuple[str, ...], BeforeValidator(_as_list, json_schema_input_type=str | tuple[str, ...])]
+JointLaws = Annotated[Laws, BeforeValidator(_as_list, json_schema_input_type=Law | Laws)]
+Values = Annotated[
+    tuple[tuple[str, Number], ...],
+    BeforeValidator(_pairs, json_schema_input_type=dict[str, Number] | tuple[tuple[str, Number], ...]),
+]
 DERIVATIVES = {"reference_rate": "reference", "reference_acceleration": "reference_rate"}
 """Laws that are, if not given, derivatives by time of others."""
 MAX_CACHED = 8  # controllers whose formulas are cached for each mechanism

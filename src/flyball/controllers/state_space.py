@@ -15,7 +15,7 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..model.controller import OUTPUT, Controller, ControlState, numbered_names, refuse_equal
-from ..model.element import Laws, Numbers, Unit, element, python_data
+from ..model.element import Law, Laws, Numbers, Unit, element, python_data
 from ..model.expressions import number
 
 Rows = list[list[float]]
@@ -110,7 +110,10 @@ def _as_matrix(value: Any) -> Any:
     return value
 
 
-Matrix = Annotated[tuple[Numbers, ...], BeforeValidator(_as_matrix)]
+Matrix = Annotated[
+    tuple[Numbers, ...],
+    BeforeValidator(_as_matrix, json_schema_input_type=float | str | Numbers | tuple[Numbers, ...]),
+]
 """Rows of numbers or expressions of parameters."""
 
 
@@ -140,7 +143,7 @@ class StateSpace(Controller):
     StateSpace.from_control : of a system of the python-control library.
     """
 
-    inputs: Annotated[Laws, BeforeValidator(_as_list)]
+    inputs: Annotated[Laws, BeforeValidator(_as_list, json_schema_input_type=Law | Laws)]
     A: Matrix = ()
     B: Matrix = ()
     C: Matrix = ()

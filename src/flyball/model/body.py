@@ -403,7 +403,10 @@ def _numbers(value: Any) -> Any:
     return a
 
 
-Array = Annotated[Any, BeforeValidator(_numbers)]
+Array = Annotated[
+    Any,
+    BeforeValidator(_numbers, json_schema_input_type=float | str | tuple[float, ...] | tuple[tuple[float, ...], ...]),
+]
 ARRAYS = ("position", "angle", "orientation", "velocity", "angular_velocity", "scale")
 
 

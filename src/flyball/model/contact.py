@@ -12,7 +12,7 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, WithJsonSchema
 
 from ..errors import ModelError
 from .body import GROUND, Bodies, Body, Ground
@@ -58,7 +58,7 @@ def _law(value: Any) -> Any:
     return value
 
 
-NormalLaw = Annotated[str, BeforeValidator(_law)]
+NormalLaw = Annotated[str, BeforeValidator(_law), WithJsonSchema({"type": "string", "enum": list(LAW_NUMBERS)})]
 NormalStiffness = Annotated[Number, Unit(None)]
 Dissipation = Annotated[Number, Unit("s/m")]
 Pressure = Annotated[Number, Unit("Pa")]
@@ -254,8 +254,8 @@ class MaterialPair(Element):
     friction, static_friction, restitution : number [1]
         As for `Material`; properties that are not given follow from the materials.
     rolling_friction, spinning_friction : number [m]
-    law, stiffness, exponent, dissipation, damping
-        Compliant contact law, as for `Contact`; restitution applies to hard contact only.
+    law, stiffness, exponent, dissipation, damping : as for `Contact`
+        Compliant contact law; restitution applies to hard contact only.
     name : str
         Composed of the materials' names if not given.
     """
@@ -316,8 +316,9 @@ def _pairs(value: Any) -> Any:
     return value
 
 
-Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
-Pairs = Annotated[tuple[tuple[str, str], ...], BeforeValidator(_pairs)]
+Names = Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=str | tuple[str, ...])]
+Pair = tuple[str, str]
+Pairs = Annotated[tuple[Pair, ...], BeforeValidator(_pairs, json_schema_input_type=Pair | tuple[Pair, ...])]
 
 
 @element

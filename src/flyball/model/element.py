@@ -251,7 +251,13 @@ def _did_you_mean(word: str, known: list[str]) -> str:
 
 @dataclass(frozen=True)
 class Element:
-    """A named part of a mechanism."""
+    """A named part of a mechanism.
+
+    Parameters
+    ----------
+    name : str
+        Its name, by which other parts, laws and results refer to it.
+    """
 
     name: str
     _: KW_ONLY

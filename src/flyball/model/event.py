@@ -199,7 +199,7 @@ def _tuple(value: Any) -> Any:
     return made if isinstance(made, tuple) else (made,)
 
 
-Actions = Annotated[tuple[Action, ...], BeforeValidator(_tuple)]
+Actions = Annotated[tuple[Action, ...], BeforeValidator(_tuple, json_schema_input_type=Action | tuple[Action, ...])]
 
 
 START = "start"

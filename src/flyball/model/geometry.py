@@ -99,4 +99,8 @@ def oriented(value: Any) -> Any:
     return tuple(value)
 
 
-Orientation = Annotated[tuple[float | str, ...], BeforeValidator(oriented), Unit("rad")]
+Orientation = Annotated[
+    tuple[float | str, ...],
+    BeforeValidator(oriented, json_schema_input_type=tuple[float | str, ...] | tuple[tuple[float, ...], ...]),
+    Unit("rad"),
+]

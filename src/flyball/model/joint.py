@@ -72,6 +72,16 @@ class Joint(Element):
     """Rows of constraint between a frame F on ``body_i`` and a frame M on ``body_j``.
 
     A joint is data: a subclass only defines its ``blocks`` and ``coordinates``.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Bodies, or frames fixed on bodies; ``"ground"`` is the world.
+    at : point [m]
+        Origin of both frames, in world coordinates of the drawn configuration.
+    axis : direction
+        Axis of the joint, in world coordinates of the drawn configuration.
     """
 
     body_i: str

@@ -35,7 +35,8 @@ from .table import Table
 
 M = TypeVar("M", bound=Model)
 
-SETTINGS = ("name", "planar", "gravity", "parameters")
+PARAMETERS = "parameters"
+SETTINGS = ("name", "planar", "gravity", PARAMETERS)
 ONE_KIND = {
     "materials": Material,
     "material_pairs": MaterialPair,
@@ -130,7 +131,7 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         items = [_value(v) for v in value]
         if any(isinstance(v, Mapping) for v in value) and sum(map(len, items)) > WIDTH:
@@ -161,15 +162,7 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
         the line, and the element.
     """
     path = Path(path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        there = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}") from None
-    except UnicodeDecodeError as error:
-        raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
-    except OSError as error:
-        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
+    text = read_text(path)
     with paths_from(path.parent):
         try:
             return loads(text, cls, os.fspath(path))
@@ -179,9 +172,28 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
             raise ModelError(f"{path} is no model file, these end in .toml, .py, .urdf or .xml: {error}") from None
 
 
+def read_text(path: Path) -> str:
+    """Return the text of a model file.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, or it is no text.
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        there = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
+    except OSError as error:
+        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
+
+
 def loads(text: str, cls: type[M], source: str = "model") -> M:
     """Read a mechanism of class ``cls`` from the text of a TOML file; ``source`` names it in messages."""
-    data = _parsed(text, source)
+    data = parsed(text, source)
     known = [*SETTINGS, *CATEGORIES]
     for key, value in data.items():
         if key not in known:
@@ -258,8 +270,14 @@ def _together(model: Model, entries: list[Entry]) -> bool:
     return bool(made)
 
 
-def _parsed(text: str, source: str) -> dict[str, Any]:
-    """Return the file's tables, or raise an error that shows the faulty line with a caret."""
+def parsed(text: str, source: str) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises
+    ------
+    ModelError
+        If it is not TOML; the message shows the faulty line with a caret.
+    """
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -324,18 +342,22 @@ def _make_element(category: str, table: Mapping[str, Any], where: str) -> Elemen
         _refuse(error, where)
 
 
+def element_types(category: str) -> list[str]:
+    """Return the types that the tables of a category may name; those of the user's own classes last."""
+    if category == "sensors":
+        return sorted(SENSORS)
+    base, room = MANY_KINDS[category]
+    importlib.import_module(f"..{room}", __package__)
+    kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
+    own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
+    return [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
+
+
 def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
     """Return the class named by the table's ``type``."""
     if category in DEFAULT_KINDS:
         fields.setdefault("type", DEFAULT_KINDS[category])
-    if category == "sensors":
-        known = sorted(SENSORS)
-    else:
-        base, room = MANY_KINDS[category]
-        importlib.import_module(f"..{room}", __package__)
-        kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
-        own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
-        known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
+    known = element_types(category)
     name = fields.pop("type", None)
     if category == "forces" and name == Touch.__name__:  # contact points of a motion, in its result file
         return Touch

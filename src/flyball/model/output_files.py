@@ -12,7 +12,7 @@ from typing import BinaryIO
 from ..errors import ModelError, cannot_write
 
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
-PICTURE, DESCRIPTION, SCENE = (".png", ".svg", ".pdf"), (".toml",), (".glb",)
+PICTURE, DESCRIPTION, SCENE, SCHEMA = (".png", ".svg", ".pdf"), (".toml",), (".glb",), (".json",)
 VIDEO = (".gif", ".mp4", ".webm")
 ROBOT = (".urdf", ".xml", ".mjcf")
 OTHER_METHODS = {

@@ -14,7 +14,13 @@ from .solid import RESOLUTION, Solid, three_lengths
 
 @element
 class Box(Solid):
-    """A box about its origin with ``edges`` = (x, y, z) [m]."""
+    """A box about its origin with ``edges`` = (x, y, z) [m].
+
+    Parameters
+    ----------
+    edges : three numbers [m]
+        Edge lengths along x, y, z.
+    """
 
     edges: Point
 

@@ -16,7 +16,15 @@ from .solid import RESOLUTION
 
 @element
 class Capsule(Cylinder):
-    """A cylinder of ``radius`` and ``length`` [m] along its z axis with a half ball on either end."""
+    """A cylinder of ``radius`` and ``length`` [m] along its z axis with a half ball on either end.
+
+    Parameters
+    ----------
+    radius : number [m]
+        Of the cylinder and of the half balls.
+    length : number [m]
+        Of the cylinder, without the half balls.
+    """
 
     def volume(self, n: SimpleNamespace) -> Any:
         """V = pi r^2 l + 4/3 pi r^3."""

@@ -15,7 +15,14 @@ from .solid import RESOLUTION, Solid
 
 @element
 class Cone(Solid):
-    """A cone of base ``radius`` and ``height`` [m]: the middle of its base at its origin, its tip at +z."""
+    """A cone of base ``radius`` and ``height`` [m]: the middle of its base at its origin, its tip at +z.
+
+    Parameters
+    ----------
+    radius : number [m]
+        Of the base.
+    height : number [m]
+    """
 
     radius: Length
     height: Length

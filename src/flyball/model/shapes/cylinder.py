@@ -15,7 +15,14 @@ from .solid import RESOLUTION, Solid
 
 @element
 class Cylinder(Solid):
-    """A cylinder of ``radius`` and ``length`` [m] along its z axis, its middle at its origin."""
+    """A cylinder of ``radius`` and ``length`` [m] along its z axis, its middle at its origin.
+
+    Parameters
+    ----------
+    radius : number [m]
+    length : number [m]
+        Along z.
+    """
 
     radius: Length
     length: Length

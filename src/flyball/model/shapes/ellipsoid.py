@@ -15,7 +15,13 @@ from .solid import RESOLUTION, Solid, three_lengths
 
 @element
 class Ellipsoid(Solid):
-    """An ellipsoid about its origin with ``semi_axes`` = (a, b, c) [m] along x, y, z."""
+    """An ellipsoid about its origin with ``semi_axes`` = (a, b, c) [m] along x, y, z.
+
+    Parameters
+    ----------
+    semi_axes : three numbers [m]
+        Half the diameters along x, y, z.
+    """
 
     semi_axes: Point
 

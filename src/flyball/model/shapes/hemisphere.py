@@ -18,7 +18,12 @@ OUTLINE = 128  # corners of a circle's outline
 
 @element
 class Hemisphere(Sphere):
-    """Half a ball of the given ``radius`` [m]: the middle of its flat side at its origin, the dome towards +z."""
+    """Half a ball of the given ``radius`` [m]: the middle of its flat side at its origin, the dome towards +z.
+
+    Parameters
+    ----------
+    radius : number [m]
+    """
 
     def volume(self, n: SimpleNamespace) -> Any:
         """V = 2/3 pi r^3."""

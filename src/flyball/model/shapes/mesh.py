@@ -78,7 +78,7 @@ def number_rows(kind: type) -> Any:
             return value
         return tuple(map(tuple, a.astype(kind).tolist()))
 
-    return BeforeValidator(convert)
+    return BeforeValidator(convert, json_schema_input_type=tuple[tuple[kind, ...], ...])  # type: ignore[valid-type]
 
 
 def _text(value: Any) -> Any:

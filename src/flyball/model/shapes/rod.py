@@ -37,6 +37,12 @@ class Rod(Solid):
     """A round bar of the given ``radius`` [m] from ``start`` to ``end``, points of the body's reference frame [m].
 
     Its own frame has its origin in the middle and z along the bar.
+
+    Parameters
+    ----------
+    start, end : point [m]
+        In the body's reference frame.
+    radius : number [m]
     """
 
     start: Point

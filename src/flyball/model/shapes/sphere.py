@@ -15,7 +15,12 @@ from .solid import RESOLUTION, Solid
 
 @element
 class Sphere(Solid):
-    """A ball of the given ``radius`` [m] about its origin."""
+    """A ball of the given ``radius`` [m] about its origin.
+
+    Parameters
+    ----------
+    radius : number [m]
+    """
 
     radius: Length
 

@@ -15,7 +15,15 @@ from .solid import RESOLUTION, Solid, smaller
 
 @element
 class Torus(Solid):
-    """A ring about its z axis: ``radius`` of the circle through the middle of its section, ``tube_radius`` [m]."""
+    """A ring about its z axis: ``radius`` of the circle through the middle of its section, ``tube_radius`` [m].
+
+    Parameters
+    ----------
+    radius : number [m]
+        Of the circle through the middle of the section.
+    tube_radius : number [m]
+        Of the section.
+    """
 
     radius: Length
     tube_radius: Length

@@ -19,6 +19,15 @@ class Tube(Cylinder):
     """A hollow cylinder along z, its middle at its origin: outer ``radius``, ``inner_radius`` and ``length`` [m].
 
     In contact it is a solid cylinder: nothing can enter its bore.
+
+    Parameters
+    ----------
+    radius : number [m]
+        Outer radius.
+    inner_radius : number [m]
+        Radius of the bore.
+    length : number [m]
+        Along z.
     """
 
     inner_radius: Length
