@@ -70,6 +70,7 @@ Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
+    run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
                                   read by load_study
@@ -160,6 +161,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.sensitivity_and_optimum import Optimum as Optimum
     from .results.sensitivity_and_optimum import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
+    from .results.spectrum import Spectrum as Spectrum
     from .results.study import Indices as Indices
     from .results.study import Study as Study
     from .simulation.integration_options import Stepping as Stepping
@@ -236,6 +238,7 @@ _HOME = {
     "RootLocus": "results.modes",
     "Sensitivity": "results.sensitivity_and_optimum",
     "Singularities": "results.singularities",
+    "Spectrum": "results.spectrum",
     "Study": "results.study",
     "Touch": "results.equilibrium",
     "Code": "symbolic.export",

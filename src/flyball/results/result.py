@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from .spectrum import Spectrum
+
 
 class OwnedLock:
     """A reentrant lock; a copy or a pickle of its owner gets a new one."""
@@ -411,6 +413,48 @@ class Result:
         from ..view.result_plots import plot_curves
 
         return plot_curves(self, *names, path=path)
+
+    def spectrum(
+        self,
+        *names: str,
+        window: str = "hann",
+        start: float | str | None = None,
+        segment: float | str | None = None,
+        outputs: int | None = None,
+    ) -> Spectrum:
+        """Return amplitude spectra (fast Fourier transform) and power spectral densities (Welch) of curves.
+
+        Parameters
+        ----------
+        *names : str
+            Scalar curves such as ``"A.rate"``, or sensors by name.
+        window : str
+            A window of ``scipy.signal`` by name. The Hann window keeps a line from spreading over all frequencies, and
+            spreads it over its two neighbours. ``"boxcar"`` (none) is for whole periods, ``"flattop"`` for amplitudes
+            at any frequency.
+        start : number or quantity [s], optional
+            Begin at this time, for instance after a transient motion.
+        segment : number or quantity [s], optional
+            Length of the segments of Welch's method, by default a quarter of the record. Longer ones resolve
+            frequencies better and average less.
+        outputs : int, optional
+            Interpolate at this number of evenly spaced times first, by cubic splines. Nothing filters out frequencies
+            above half the new sampling frequency.
+
+        Returns
+        -------
+        Spectrum
+
+        Raises
+        ------
+        ModelError
+            If there is no such curve or window, or a length does not fit the motion.
+        AnalysisError
+            If output times are too few or, without ``outputs``, not evenly spaced; or a curve is not finite.
+        """
+        from .spectrum import curve_spectrum
+
+        return curve_spectrum(self, names, window, start, segment, outputs)
 
     def plot_path(self, *points: Any, **options: Any) -> Any:
         """Draw paths of points with their velocities; see `flyball.view.path_plots.plot_path` for the options."""
