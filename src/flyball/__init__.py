@@ -70,6 +70,7 @@ Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
+    run.compare("test.csv")       -> MeasurementComparison with measured curves: RMS, largest deviation, R^2
     run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
@@ -151,6 +152,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.equilibrium import Touch as Touch
     from .results.inverse_dynamics import InverseDynamics as InverseDynamics
     from .results.linear_model import LinearModel as LinearModel
+    from .results.measurements import MeasurementComparison as MeasurementComparison
     from .results.mechanism_report import MassReport as MassReport
     from .results.mechanism_report import Report as Report
     from .results.mobility import Mobility as Mobility
@@ -224,6 +226,7 @@ _HOME = {
     "Stepper": "simulation.stepper",
     "Prepared": "kinematics.prepared",
     "MassReport": "results.mechanism_report",
+    "MeasurementComparison": "results.measurements",
     "Mobility": "results.mobility",
     "Report": "results.mechanism_report",
     "Comparison": "results.comparison",

@@ -57,6 +57,9 @@ MADE = {
     "Equations": lambda: crank().symbolic(),
     "Prepared": lambda: crank().prepare(),
     "Code": lambda: rig().export(),
+    "MeasurementComparison": lambda: (
+        crank().simulate(0.02, outputs=3).compare({"t": [0.0, 0.01], "slider.x": [0.7, 0.69]})
+    ),
     "Spectrum": lambda: crank().simulate(0.2, outputs=101).spectrum("A.angle_rate", "slider.x"),
 }
 

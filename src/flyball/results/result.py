@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from .measurements import MeasurementComparison
     from .spectrum import Spectrum
 
 
@@ -413,6 +414,29 @@ class Result:
         from ..view.result_plots import plot_curves
 
         return plot_curves(self, *names, path=path)
+
+    def compare(self, data: str | os.PathLike | Mapping[str, Any]) -> MeasurementComparison:
+        """Compare the motion with measured curves: root mean square and largest deviation, R^2.
+
+        Parameters
+        ----------
+        data : str, path, or mapping of str to array
+            A table (.csv) with a heading line, or arrays by heading: times ``t [s]``, and measured curves such as
+            ``slider.x [mm]``; without a unit in SI. An empty entry or nan is a value that was not measured. Times
+            outside the motion are left out.
+
+        Returns
+        -------
+        MeasurementComparison
+
+        Raises
+        ------
+        ModelError
+            If a quantity does not exist, the data are no table of numbers, or no value can be compared.
+        """
+        from .measurements import compare_with_measurements
+
+        return compare_with_measurements(self, data)
 
     def spectrum(
         self,

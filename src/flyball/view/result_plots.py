@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from ..results.comparison import Comparison
+    from ..results.measurements import MeasurementComparison
     from ..results.result import Result
     from ..results.spectrum import Spectrum
 
@@ -181,6 +183,28 @@ def _curves_of(result: Result, name: str) -> list[Channel]:
 def write_standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
     """Write the standard pictures into an existing folder; return their paths."""
     return write_pictures(standard_pictures(result), Path(folder))
+
+
+AXIS_ROOM = 0.05  # of the range of values, left free above and below
+
+
+def measurement_plot(comparison: MeasurementComparison, path: str | os.PathLike | None = None) -> Any:
+    """Draw curves of a motion with the measured values as dots; see `plot_curves`."""
+    whole = motion_with_event_states(comparison.result)
+    curves = [Channel(name, *whole.curve(name)) for name in comparison.names]
+    measured = dict(zip(comparison.names, comparison.measured.T, strict=True))
+    with plot_style():
+        panels = tuple(replace(p, note="dots: measured") for p in panels_by_unit(curves, len(curves)))
+        drawing = panels_over_time(whole.t, panels, marks=event_marks(comparison.result))
+        for ax, panel in zip(drawing.axes, panels, strict=True):
+            for line, c in zip(ax.lines[: len(panel.curves)], panel.curves, strict=True):
+                points = measured[c.name]
+                room = AXIS_ROOM * np.nanmax([np.ptp(c.values), np.nanmax(points) - np.nanmin(points)])
+                low, high = ax.get_ylim()
+                ax.plot(comparison.t, points, "o", color=line.get_color(), markersize=3.5)
+                ax.set_ylim(min(low, np.nanmin(points) - room), max(high, np.nanmax(points) + room))
+        set_title(drawing, f"{comparison.result.model.name}: measured and computed")
+        return finish_figure(drawing, path)
 
 
 DENSITY_DECADES = 12  # shown below the largest power spectral density
