@@ -71,6 +71,7 @@ Read a result
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
     run.compare("test.csv")       -> MeasurementComparison with measured curves: RMS, largest deviation, R^2
+    run.differences(other)        -> Differences of two motions: parameters, parts, curves, events, health
     run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
@@ -147,6 +148,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.shapes import *
     from .model.table import Table as Table
     from .results.comparison import Comparison as Comparison
+    from .results.differences import Differences as Differences
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.equilibrium import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Touch as Touch
@@ -230,6 +232,7 @@ _HOME = {
     "Mobility": "results.mobility",
     "Report": "results.mechanism_report",
     "Comparison": "results.comparison",
+    "Differences": "results.differences",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.equilibrium",
     "Indices": "results.study",

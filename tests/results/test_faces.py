@@ -57,6 +57,7 @@ MADE = {
     "Equations": lambda: crank().symbolic(),
     "Prepared": lambda: crank().prepare(),
     "Code": lambda: rig().export(),
+    "Differences": lambda: crank().simulate(0.02, outputs=3).differences(crank().simulate(0.02, outputs=4)),
     "MeasurementComparison": lambda: (
         crank().simulate(0.02, outputs=3).compare({"t": [0.0, 0.01], "slider.x": [0.7, 0.69]})
     ),

@@ -166,16 +166,35 @@ def _in_si(table: _Table, heading: str, values: Any, unit: str) -> np.ndarray:
         raise type(error)(f"{table.source}, column {heading!r}: {error}") from None
 
 
-def curve_at(result: Result, names: tuple[str, ...], times: np.ndarray) -> np.ndarray:
-    """Return curves (n, k) at any times, linearly interpolated between output times and events; nan outside the motion.
+NEAR_PART = 1e-6  # distance of two times relative to the mean step, below which the second adds rounding errors only
 
-    States on both sides of each event are used, so that a jump stays one.
+
+def curve_at(result: Result, names: tuple[str, ...], times: np.ndarray) -> np.ndarray:
+    """Return curves (n, k) at any times, interpolated by cubic splines between output times; nan outside the motion.
+
+    A spline does not go across an event: the states on both sides of it are used, so that a jump stays one.
     """
     from ..view.motion_with_events import motion_with_event_states
 
     whole = motion_with_event_states(result)
-    values = [np.asarray(whole.curve(name)[1], float) for name in names]
-    return np.stack([np.interp(times, whole.t, v, left=np.nan, right=np.nan) for v in values], axis=1)
+    return np.stack([_interpolated(whole.t, np.asarray(whole.curve(name)[1], float), times) for name in names], axis=1)
+
+
+def _interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Interpolate within each run of ascending times and finite values; nan between them."""
+    from scipy.interpolate import CubicSpline
+
+    out = np.full(len(times), np.nan)
+    finite = np.isfinite(values)
+    steps = np.diff(t, prepend=-np.inf)
+    near = (steps > 0.0) & (steps < NEAR_PART * (t[-1] - t[0]) / len(t))
+    run = np.cumsum(~finite | (steps <= 0.0))
+    for k in np.unique(run[finite]):
+        all_rows = np.flatnonzero((run == k) & finite)
+        rows = all_rows[~near[all_rows] | (all_rows == all_rows[0])]
+        inside = (times >= t[rows[0]]) & (times <= t[all_rows[-1]])
+        out[inside] = CubicSpline(t[rows], values[rows])(times[inside]) if len(rows) > 1 else values[rows[0]]
+    return out
 
 
 @dataclass
@@ -193,7 +212,7 @@ class MeasurementComparison:
     measured : ndarray (n, k)
         Measured values, nan where there is none.
     computed : ndarray (n, k)
-        Values of the motion at these times, interpolated linearly between output times; nan outside the motion.
+        Values of the motion at these times, interpolated between output times; nan outside the motion.
     result : Result
         The motion.
     """
@@ -250,16 +269,12 @@ class MeasurementComparison:
         motion = self.result.t
         out = [
             ("measured", f"{self.source}: {len(self.t)} times, {self.t[0]:g} to {self.t[-1]:g} s"),
-            ("computed", f"{self.result.model.name}, interpolated linearly between {len(motion)} output times"),
+            ("computed", f"{self.result.model.name}, interpolated between {len(motion)} output times"),
         ]
         outside = int(((self.t < motion[0]) | (self.t > motion[-1])).sum())
         if outside:
-            out.append(
-                (
-                    "left out",
-                    f"{outside} {'time' if outside == 1 else 'times'} outside the motion, {motion[0]:g} to {motion[-1]:g} s",
-                )
-            )
+            times = "time" if outside == 1 else "times"
+            out.append(("left out", f"{outside} {times} outside the motion, {motion[0]:g} to {motion[-1]:g} s"))
         rms, largest, r_squared, counts = self.rms, self.largest, self.r_squared, self.counts
         for k, name in enumerate(self.names):
             size = float(np.nanmax(np.abs(self.measured[:, k])))

@@ -33,7 +33,7 @@ from .events import (
 from .health import ContactHealth, Health
 from .motion_record import MeasuredQuantities, MotionRecord, RecordedMotion, record_motion
 from .part_views import has_view, view_of
-from .part_views.base import Curves, SplicedView
+from .part_views.base import SplicedView
 from .part_views.bodies import SET_MOTION_ARRAYS, BodySetMotion, BodySetView, SetMemberView
 from .reactions import EventImpulses, JointReactions
 from .wording import range_text
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from .differences import Differences
     from .measurements import MeasurementComparison
     from .spectrum import Spectrum
 
@@ -343,18 +344,17 @@ class Result:
         """Return labels and texts: times, health, and ranges of the first curves."""
         over = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
         out = [("motion", f"{self.model.name}, {over}"), *self.health.lines()]
-        return out + [
-            (name, f"{range_text(v)} {unit.replace('*', ' ')}") for name, (unit, v) in self._telling().items()
-        ]
+        curves = {name: self.channel(name) for name in self.main_curves()} if len(self.t) else {}
+        return out + [(name, f"{range_text(v)} {unit.replace('*', ' ')}") for name, (unit, v) in curves.items()]
 
-    def _telling(self) -> Curves:
+    def main_curves(self) -> list[str]:
         """Return up to twelve of the most important curves: sensors, efforts of drivers, coordinates of joints."""
         m, planar = self.model, self.planar
         names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
         names += [f"{d.name}.effort" for d in m.drivers]
         names += [f"{j.name}.{what}" for j in m.joints for what in j.independent(planar)]
         names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
-        return {name: self.channel(name) for name in names[:SHOWN_CURVES]} if len(self.t) else {}
+        return names[:SHOWN_CURVES]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names: times, all curves with their units, and the health."""
@@ -437,6 +437,32 @@ class Result:
         from .measurements import compare_with_measurements
 
         return compare_with_measurements(self, data)
+
+    def differences(self, other: Result, *names: str) -> Differences:
+        """Return the differences of another motion from this one: parameters, parts, curves, events, health.
+
+        The motions may be those of different mechanisms. Compared are the curves that both have under one name and
+        unit, over the times that both have; parts that only one has are listed.
+
+        Parameters
+        ----------
+        other : Result
+        *names : str
+            Curves to compare; all common ones by default.
+
+        Returns
+        -------
+        Differences
+
+        Raises
+        ------
+        ModelError
+            If a curve does not exist in both, one mechanism is planar and the other spatial, or they have no body or no
+            time in common.
+        """
+        from .differences import compare_results
+
+        return compare_results(self, other, names)
 
     def spectrum(
         self,
