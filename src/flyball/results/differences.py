@@ -140,11 +140,11 @@ def _motion_text(r: Result) -> str:
 def compare_results(first: Result, other: Result, names: tuple[str, ...] = ()) -> Differences:
     """Compare two motions: see `Result.differences`."""
     _check_comparable(first, other)
-    ours, theirs = _curve_units(first), _curve_units(other)
+    chosen = names or _common_curves(first, other)
     for name in names:
-        first.curve(name)
-        other.curve(name)
-    chosen = names or tuple(k for k, unit in ours.items() if theirs.get(k) == unit)
+        units = [r.curve(name)[0] for r in (first, other)]
+        if units[0] != units[1]:
+            raise ModelError(f"{name!r} is in {units[0]} in one motion and in {units[1]} in the other: leave it out")
     equal = len(first.t) == len(other.t) and np.array_equal(first.t, other.t)
     health = {k: v for k, v in _paired(_health_lines(first), _health_lines(other), "").items() if v[0] != v[1]}
     never = EventCount(0, np.nan)
@@ -193,8 +193,10 @@ def _paired(a: dict, b: dict, missing: Any) -> dict[Any, tuple[Any, Any]]:
     return {k: (a.get(k, missing), b.get(k, missing)) for k in dict.fromkeys([*a, *b])}
 
 
-def _curve_units(r: Result) -> dict[str, str]:
-    return {k: unit for k, (unit, _) in r.channels().items()}
+def _common_curves(first: Result, other: Result) -> tuple[str, ...]:
+    """Return the curves that both have in the same unit."""
+    theirs = {k: unit for k, (unit, _) in other.channels().items()}
+    return tuple(k for k, (unit, _) in first.channels().items() if theirs.get(k) == unit)
 
 
 def _parameters(r: Result) -> dict[str, float]:

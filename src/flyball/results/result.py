@@ -513,7 +513,11 @@ class Result:
         return plot_path(self, *points, **options)
 
     def html(self, **options: Any) -> str:
-        """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animation.animation_html`."""
+        """The animation page as text.
+
+        Options are those of `flyball.view.animation.animation_html`: ``paths`` of points, what to ``show``, ``others``
+        to compare with, such as ``others={"stiff": other}``, and ``measured="test.csv"``.
+        """
         from ..view.animation import animation_html
 
         return animation_html(self, **options)
