@@ -60,16 +60,30 @@ def test_tables_have_the_rows_of_the_plotted_curves(page, motions):
     assert any(row.startswith("cart.vx") for row in shown)
 
 
+INK = """() => {
+    const canvas = document.querySelector(".plot canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let dark = 0;
+    for (let k = 0; k < data.length; k += 4) dark += data[k + 3] > 200 && Math.max(data[k], data[k + 1], data[k + 2]) < 80;
+    return dark;
+}"""
+
+
 def test_measured_values_are_dots_and_figures(page, motions):
     t = np.linspace(0.0, 1.5, 16)
-    tab = page(motions[0], measured={"t": t, "cart.x [mm]": 1e3 * np.sin(2.0 * t) + 500.0})
+    off = np.where(np.arange(16) == 5, 0.6, 0.5)
+    x = np.sin(2.0 * t)
+    tab = page(motions[0], measured={"t": t, "cart.x [mm]": 1e3 * (x + off)})
+    tab.settle()
     row = tab.locator(".differences tbody tr").inner_text().split("\t")
-    assert row == ["cart.x", "0.5 m", "0.5 m", "0", f"{1 - 0.25 / np.sin(2.0 * t).var():.5g}".replace("-", "-")]
-    plot = "flyball_plot"
-    tab.evaluate("() => { window.flyball_plot = document.querySelector('.plot canvas') }")
-    assert tab.evaluate(f"{plot} !== null")
+    r_squared = 1 - (off**2).mean() / (x + off).var()
+    assert row == ["cart.x", f"{np.sqrt((off**2).mean()):.4g} m", "0.6 m", "0.5", f"{r_squared:.5g}".replace("-", "−")]
     assert tab.locator(".compared").inner_text().strip() == "measured: arrays"
+    assert tab.evaluate(INK) > 16 * 8
     assert tab.errors == []
+    plain = page(motions[0])
+    plain.settle()
+    assert plain.evaluate(INK) == 0
 
 
 def test_a_report_compares_too(motions, tmp_path):

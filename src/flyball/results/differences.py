@@ -24,7 +24,7 @@ class CurveDifference(NamedTuple):
     """Difference of one curve, the other motion's less the first one's, in ``unit``.
 
     ``largest`` is the one of the largest magnitude, at the time ``at`` [s]; ``final`` is that at the last common time;
-    ``size`` is the largest magnitude of the curves.
+    ``size`` is the largest magnitude of all compared curves of this unit.
     """
 
     name: str
@@ -246,7 +246,8 @@ def _curve_differences(first: Result, other: Result, names: tuple[str, ...]) -> 
             size = float(max(np.abs(a[known, k]).max(), np.abs(b[known, k]).max()))
             figures = (float(change[i]), float(times[i]), float(change[known[-1]]), size)
             out.append(CurveDifference(name, first.curve(name)[0], *figures))
-    return tuple(out)
+    sizes = {unit: max(c.size for c in out if c.unit == unit) for unit in {c.unit for c in out}}
+    return tuple(c._replace(size=sizes[c.unit]) for c in out)
 
 
 def _event_counts(r: Result) -> dict[tuple[str, str], EventCount]:
