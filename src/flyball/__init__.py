@@ -70,6 +70,9 @@ Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
+    run.compare("test.csv")       -> MeasurementComparison with measured curves: RMS, largest deviation, R^2
+    run.differences(other)        -> Differences of two motions: parameters, parts, curves, events, health
+    run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
                                   read by load_study
@@ -145,11 +148,13 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.shapes import *
     from .model.table import Table as Table
     from .results.comparison import Comparison as Comparison
+    from .results.differences import Differences as Differences
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.equilibrium import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Touch as Touch
     from .results.inverse_dynamics import InverseDynamics as InverseDynamics
     from .results.linear_model import LinearModel as LinearModel
+    from .results.measurements import MeasurementComparison as MeasurementComparison
     from .results.mechanism_report import MassReport as MassReport
     from .results.mechanism_report import Report as Report
     from .results.mobility import Mobility as Mobility
@@ -160,6 +165,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.sensitivity_and_optimum import Optimum as Optimum
     from .results.sensitivity_and_optimum import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
+    from .results.spectrum import Spectrum as Spectrum
     from .results.study import Indices as Indices
     from .results.study import Study as Study
     from .simulation.integration_options import Stepping as Stepping
@@ -222,9 +228,11 @@ _HOME = {
     "Stepper": "simulation.stepper",
     "Prepared": "kinematics.prepared",
     "MassReport": "results.mechanism_report",
+    "MeasurementComparison": "results.measurements",
     "Mobility": "results.mobility",
     "Report": "results.mechanism_report",
     "Comparison": "results.comparison",
+    "Differences": "results.differences",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.equilibrium",
     "Indices": "results.study",
@@ -236,6 +244,7 @@ _HOME = {
     "RootLocus": "results.modes",
     "Sensitivity": "results.sensitivity_and_optimum",
     "Singularities": "results.singularities",
+    "Spectrum": "results.spectrum",
     "Study": "results.study",
     "Touch": "results.equilibrium",
     "Code": "symbolic.export",

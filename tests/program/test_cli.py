@@ -238,6 +238,25 @@ def test_view_writes_the_page_and_opens_it(here: Path, monkeypatch: pytest.Monke
     assert opened == [(here / "r.html").resolve().as_uri()]
 
 
+def test_view_compares_results_and_measured_curves(here: Path) -> None:
+    Path("other").mkdir()
+    r = slider_crank()
+    for name in ("a.nc", "b.nc", "other/a.nc"):
+        r.save(name)
+    Path("test.csv").write_text("t,slider.x\n0,0.1\n0.1,0.1\n")
+    said = Said("view", "a.nc", "b.nc", "other/a.nc", "--measured", "test.csv", "--no-open")
+    assert (said.code, said.out) == (0, "a-compared.html\n")
+    assert Path("a-compared.html").stat().st_size > 10_000
+    for words, message in (
+        (["a.nc", "a.nc"], "'a.nc' is given twice"),
+        (["a.nc", "a-compared.html"], "'a-compared.html' is a page; a comparison needs results (.nc)"),
+        (["a.nc", "--measured", "none.csv"], "cannot read 'none.csv'"),
+    ):
+        said = Said("view", *words, "--no-open")
+        assert said.code == 2
+        assert message in said.err
+
+
 BODY = "fb.Body('b', mass=1, inertia=1)"
 
 

@@ -57,12 +57,18 @@ MADE = {
     "Equations": lambda: crank().symbolic(),
     "Prepared": lambda: crank().prepare(),
     "Code": lambda: rig().export(),
+    "Differences": lambda: crank().simulate(0.02, outputs=3).differences(crank().simulate(0.02, outputs=4)),
+    "MeasurementComparison": lambda: (
+        crank().simulate(0.02, outputs=3).compare({"t": [0.0, 0.01], "slider.x": [0.7, 0.69]})
+    ),
+    "Spectrum": lambda: crank().simulate(0.2, outputs=101).spectrum("A.angle_rate", "slider.x"),
 }
 
 
 def returned() -> set[str]:
-    """Names of the classes that methods of a mechanism return."""
-    out = set()
+    """Names of the classes that methods of a mechanism return, and public ones that those of a motion return."""
+    out = {str(f.__annotations__.get("return", "")) for _, f in inspect.getmembers(fb.Result, inspect.isfunction)}
+    out &= set(dir(fb))
     for name, f in inspect.getmembers(fb.Mechanism, inspect.isfunction):
         if f.__module__.startswith("flyball.mechanism_methods") and not name.startswith("_"):
             out |= set(re.findall(r"\w+", str(f.__annotations__.get("return", "")))) - {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,16 +12,29 @@ import typer
 from ..errors import ModelError
 from .application import AsJson, app, print_json, report_errors
 
+Results = Annotated[
+    list[Path],
+    typer.Argument(help="A result (.nc) or an animation page (.html); further results are ghosts beside the first."),
+]
+MeasuredFile = Annotated[
+    Path | None,
+    typer.Option(help="Measured curves over those of the first result, in a table (.csv)."),
+]
 
-@app.command()
+
+@app.command(short_help="Show a result in the web browser, or compare several.")
 def view(
-    file: Annotated[Path, typer.Argument(help="A result (.nc) or an animation page (.html).")],
+    files: Results,
+    measured: MeasuredFile = None,
     no_open: Annotated[bool, typer.Option("--no-open", help="Only write the page and print where it is.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show a result in the web browser."""
+    """Show a result in the web browser, or compare several: ghosts, curves over each other, a table of differences.
+
+    The page is written beside the first result; of a comparison its name ends in -compared.
+    """
     with report_errors(as_json):
-        page = _page_file(file)
+        page = _page_file(files, measured)
         if as_json:
             print_json({"page": str(page)})
         else:
@@ -31,19 +45,25 @@ def view(
             webbrowser.open(page.resolve().as_uri())
 
 
-def _page_file(file: Path) -> Path:
-    """Return the animation page of a file: the file itself, or a page written beside the result.
+def _page_file(files: Sequence[Path], measured: Path | None) -> Path:
+    """Return the animation page of files: the file itself, or a page written beside the first result.
 
     If that folder is not writable, a temporary folder is used.
     """
-    if file.suffix.lower() in (".html", ".htm"):
-        if not file.is_file():
-            raise ModelError(f"there is no file {str(file)!r}")
-        return file
+    first, *rest = files
+    compared = bool(rest or measured)
+    if page := next((f for f in files if f.suffix.lower() in (".html", ".htm")), None):
+        if compared:
+            raise ModelError(f"{str(page)!r} is a page; a comparison needs results (.nc), as run.save('run.nc') writes")
+        if not page.is_file():
+            raise ModelError(f"there is no file {str(page)!r}")
+        return page
     from ..mechanism import load_result
 
-    text = load_result(file).html()
-    page = file.with_suffix(".html")
+    labels = _labels(files)
+    others = dict(zip(labels[1:], map(load_result, rest), strict=True))
+    text = load_result(first).html(others=others, label=labels[0] if rest else "", measured=measured)
+    page = first.with_name(f"{first.stem}-compared.html") if compared else first.with_suffix(".html")
     from ..model.output_files import write_file
 
     try:
@@ -56,8 +76,23 @@ def _page_file(file: Path) -> Path:
     return page
 
 
+def _labels(files: Sequence[Path]) -> list[str]:
+    """Return a label of each file: its name without the suffix, or its path where names are equal.
+
+    Raises
+    ------
+    ModelError
+        If a file is given twice.
+    """
+    if twice := next((f for k, f in enumerate(files) if f in files[:k]), None):
+        raise ModelError(f"{str(twice)!r} is given twice")
+    stems = [f.stem for f in files]
+    return stems if len(set(stems)) == len(stems) else [str(f.with_suffix("")) for f in files]
+
+
 SCHEMA_FILE = "flyball.schema.json"
 """The file in which `new` expects the schema of model files."""
+
 _PACKAGE = Path(__file__).parents[1]
 _FROM_EXAMPLES = {  # name for ``new``: file in examples/, in the wheel models/ (pyproject.toml)
     "bouncing-ball": "bouncing_ball",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +33,7 @@ from .events import (
 from .health import ContactHealth, Health
 from .motion_record import MeasuredQuantities, MotionRecord, RecordedMotion, record_motion
 from .part_views import has_view, view_of
-from .part_views.base import Curves, SplicedView
+from .part_views.base import SplicedView
 from .part_views.bodies import SET_MOTION_ARRAYS, BodySetMotion, BodySetView, SetMemberView
 from .reactions import EventImpulses, JointReactions
 from .wording import range_text
@@ -41,6 +41,10 @@ from .wording import range_text
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+    from .differences import Differences
+    from .measurements import MeasurementComparison
+    from .spectrum import Spectrum
 
 
 class OwnedLock:
@@ -340,18 +344,17 @@ class Result:
         """Return labels and texts: times, health, and ranges of the first curves."""
         over = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
         out = [("motion", f"{self.model.name}, {over}"), *self.health.lines()]
-        return out + [
-            (name, f"{range_text(v)} {unit.replace('*', ' ')}") for name, (unit, v) in self._telling().items()
-        ]
+        curves = {name: self.channel(name) for name in self.main_curves()} if len(self.t) else {}
+        return out + [(name, f"{range_text(v)} {unit.replace('*', ' ')}") for name, (unit, v) in curves.items()]
 
-    def _telling(self) -> Curves:
+    def main_curves(self) -> list[str]:
         """Return up to twelve of the most important curves: sensors, efforts of drivers, coordinates of joints."""
         m, planar = self.model, self.planar
         names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
         names += [f"{d.name}.effort" for d in m.drivers]
         names += [f"{j.name}.{what}" for j in m.joints for what in j.independent(planar)]
         names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
-        return {name: self.channel(name) for name in names[:SHOWN_CURVES]} if len(self.t) else {}
+        return names[:SHOWN_CURVES]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names: times, all curves with their units, and the health."""
@@ -412,6 +415,97 @@ class Result:
 
         return plot_curves(self, *names, path=path)
 
+    def compare(self, data: str | os.PathLike | Mapping[str, Any]) -> MeasurementComparison:
+        """Compare the motion with measured curves: root mean square and largest deviation, R^2.
+
+        Parameters
+        ----------
+        data : str, path, or mapping of str to array
+            A table (.csv) with a heading line, or arrays by heading: times ``t [s]``, and measured curves such as
+            ``slider.x [mm]``; without a unit in SI. An empty entry or nan is a value that was not measured. Times
+            outside the motion are left out.
+
+        Returns
+        -------
+        MeasurementComparison
+
+        Raises
+        ------
+        ModelError
+            If a quantity does not exist, the data are no table of numbers, or no value can be compared.
+        """
+        from .measurements import compare_with_measurements
+
+        return compare_with_measurements(self, data)
+
+    def differences(self, other: Result, *names: str) -> Differences:
+        """Return the differences of another motion from this one: parameters, parts, curves, events, health.
+
+        The motions may be those of different mechanisms. Compared are the curves that both have under one name and
+        unit, over the times that both have; parts that only one has are listed.
+
+        Parameters
+        ----------
+        other : Result
+        *names : str
+            Curves to compare; all common ones by default.
+
+        Returns
+        -------
+        Differences
+
+        Raises
+        ------
+        ModelError
+            If a curve does not exist in both, one mechanism is planar and the other spatial, or they have no body or no
+            time in common.
+        """
+        from .differences import compare_results
+
+        return compare_results(self, other, names)
+
+    def spectrum(
+        self,
+        *names: str,
+        window: str = "hann",
+        start: float | str | None = None,
+        segment: float | str | None = None,
+        outputs: int | None = None,
+    ) -> Spectrum:
+        """Return amplitude spectra (fast Fourier transform) and power spectral densities (Welch) of curves.
+
+        Parameters
+        ----------
+        *names : str
+            Scalar curves such as ``"A.rate"``, or sensors by name.
+        window : str
+            A window of ``scipy.signal`` by name. The Hann window keeps a line from spreading over all frequencies, and
+            spreads it over its two neighbours. ``"boxcar"`` (none) is for whole periods, ``"flattop"`` for amplitudes
+            at any frequency.
+        start : number or quantity [s], optional
+            Begin at this time, for instance after a transient motion.
+        segment : number or quantity [s], optional
+            Length of the segments of Welch's method, by default a quarter of the record. Longer ones resolve
+            frequencies better and average less.
+        outputs : int, optional
+            Interpolate at this number of evenly spaced times first, by cubic splines. Nothing filters out frequencies
+            above half the new sampling frequency.
+
+        Returns
+        -------
+        Spectrum
+
+        Raises
+        ------
+        ModelError
+            If there is no such curve or window, or a length does not fit the motion.
+        AnalysisError
+            If output times are too few or, without ``outputs``, not evenly spaced; or a curve is not finite.
+        """
+        from .spectrum import curve_spectrum
+
+        return curve_spectrum(self, names, window, start, segment, outputs)
+
     def plot_path(self, *points: Any, **options: Any) -> Any:
         """Draw paths of points with their velocities; see `flyball.view.path_plots.plot_path` for the options."""
         from ..view.path_plots import plot_path
@@ -419,7 +513,11 @@ class Result:
         return plot_path(self, *points, **options)
 
     def html(self, **options: Any) -> str:
-        """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animation.animation_html`."""
+        """The animation page as text.
+
+        Options are those of `flyball.view.animation.animation_html`: ``paths`` of points, what to ``show``, ``others``
+        to compare with, such as ``others={"stiff": other}``, and ``measured="test.csv"``.
+        """
         from ..view.animation import animation_html
 
         return animation_html(self, **options)

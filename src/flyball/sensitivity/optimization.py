@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +15,9 @@ from ..errors import AnalysisError, Interrupted, ModelError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..model.quantities import single_quantity
-from ..model.units import to_si
 from ..model.unsupported_elements import refuse_unsupported
 from ..progress import ReportProgress, progress_bar
+from ..results.measurements import Measurements, read_measurements
 from ..results.sensitivity_and_optimum import Fit, Optimum
 from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
 
@@ -394,19 +393,10 @@ class FitOptions(AnalysisOptions):
         )  # fmt: skip
 
 
-class Measurements(NamedTuple):
-    """Measured curves: names, times (n,), values (n, of) in SI units, and whether each was measured."""
-
-    names: tuple[str, ...]
-    t: np.ndarray
-    values: np.ndarray
-    known: np.ndarray
-
-
 def fit(model: Model, o: FitOptions) -> Fit:
     """Fit parameters to measurements: see `Mechanism.fit`."""
     refuse_unsupported(model, "fit", controlled=True)
-    m = _measurements(model, o.data)
+    m = read_measurements(model, o.data)
     given = _noise(model, m, o.noise)
     finite = np.where(m.known, m.values, np.nan)
     ranges = np.nanmax(finite, axis=0) - np.nanmin(finite, axis=0)
@@ -423,60 +413,6 @@ def fit(model: Model, o: FitOptions) -> Fit:
         sigma = _noise_of_residuals(m, found, sigma, len(o.to))
     J = sensitivity(model, o.optimization(m, np.ones(1), {}).sensitivity(found.parameters)).derivatives
     return _with_intervals(o, m, found, J, sigma, bool(given))
-
-
-def _measurements(model: Model, data: Any) -> Measurements:
-    """Read measurements from a table in a file, or from arrays by name.
-
-    Raises
-    ------
-    ModelError
-        If there is no such file or quantity, a unit does not fit, or times do not ascend.
-    """
-    columns = _columns_of_file(data) if isinstance(data, str | os.PathLike) else dict(data)
-    names = [name.partition("[")[0].strip() for name in columns]
-    if repeated := next((x for k, x in enumerate(names) if x in names[:k]), None):
-        raise ModelError(f"two columns of the data are named {repeated!r}; leave one of them out")
-    columns = dict(zip(names, columns.items(), strict=True))
-    time = next((columns.pop(k) for k in ("t", "time") if k in columns), None)
-    if time is None or not columns:
-        raise ModelError("the data need times, 't' or 'time', and at least one measured curve, such as 'slider.x [mm]'")
-    t = _in_si(time[0], time[1], "s")
-    if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
-        raise ModelError("the data need two or more finite times in ascending order")
-    values = []
-    for name, (heading, x) in columns.items():
-        v = _in_si(heading, x, single_quantity(model, name).unit)
-        if v.shape != t.shape:
-            raise ModelError(f"{name!r} has {v.size} values at {len(t)} times; leave gaps as nan")
-        if not np.isfinite(v).any():
-            raise ModelError(f"{name!r} has no finite value")
-        values.append(v)
-    table = np.stack(values, axis=1)
-    return Measurements(tuple(columns), t, table, np.isfinite(table))
-
-
-def _columns_of_file(path: str | os.PathLike) -> dict[str, Any]:
-    """Return the columns of a table with a heading line; empty entries are nan."""
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            head, *rows = [row for row in csv.reader(file) if row]
-        head = [name.strip() for name in head]
-        if len(set(head)) < len(head) or any(len(row) != len(head) for row in rows):
-            raise ValueError("each line needs one entry for each heading, and no heading may occur twice")
-        table = [[float(x) if x.strip() else np.nan for x in row] for row in rows]
-        return {name: [row[k] for row in table] for k, name in enumerate(head)}
-    except OSError as error:
-        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
-    except (ValueError, csv.Error) as error:
-        raise ModelError(f"{os.fspath(path)!r} is no table of numbers with a heading line: {error}") from None
-
-
-def _in_si(heading: str, values: Any, unit: str) -> np.ndarray:
-    """Return a column in SI units; its own unit stands in brackets in its heading."""
-    name, bracket, own = heading.partition("[")
-    x = _number_array(values, name.strip())
-    return x * to_si(f"1 {own.rstrip('] ')}", unit or "1") if bracket else x
 
 
 def _noise(model: Model, m: Measurements, noise: Mapping[str, float | str] | None) -> dict[str, float]:

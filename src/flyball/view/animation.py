@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..model.controller import Controller
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from .body_shapes import BodyShapes
+from .comparison_tables import difference_tables, measurement_table
 from .event_marks import event_marks
 from .motion_with_events import add_event_states
 from .page import animation_page
@@ -22,6 +24,9 @@ from .playback import Playback, playback_of
 from .recording import (
     SHOW_OPTIONS,
     Channel,
+    Compared,
+    ComparisonTable,
+    MeasuredCurve,
     RecordedBody,
     RecordedCurve,
     RecordedFrame,
@@ -80,7 +85,15 @@ DEFAULT_SHOW = ("loads", "moments", "grid")
 PathRequest = str | tuple[str, Any]
 
 
-def animation_html(result: Result, *, paths: Iterable[PathRequest] = (), show: Collection[str] = DEFAULT_SHOW) -> str:
+def animation_html(
+    result: Result,
+    *,
+    paths: Iterable[PathRequest] = (),
+    show: Collection[str] = DEFAULT_SHOW,
+    others: Mapping[str, Result] | None = None,
+    label: str = "",
+    measured: Any = None,
+) -> str:
     """Return the animation page of a result: one self-contained HTML document.
 
     Parameters
@@ -91,15 +104,90 @@ def animation_html(result: Result, *, paths: Iterable[PathRequest] = (), show: C
         ``paths=["P", ("coupler", (0.1, 0.2))]``.
     show : names
         Displays switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
+    others : mapping of str to Result, optional
+        Other motions by label, up to six. Each is a ghost in a colour, without its forces and its sets of bodies; its
+        curves lie over those of the same names, and tables list the differences, as `Result.differences` does. The page
+        has the times of the first motion.
+    label : str
+        Label of the motion itself beside others; by default the name of the mechanism.
+    measured : str, path, or mapping of str to array, optional
+        Measured curves, as in `Result.compare`: dots over the curves, and a table of deviations.
 
     Raises
     ------
     ModelError
-        If there is no output time, no such part, or nothing of that name to show.
+        If there is no output time, no such part, or nothing of that name to show; if motions cannot be compared, or the
+        measured curves are not as `Result.compare` needs them.
     """
-    from .page import animation_page
+    return animation_page(
+        record_comparison(result, paths=paths, show=show, others=others, label=label, measured=measured)
+    )
 
-    return animation_page(record_motion(result, paths=paths, show=show))
+
+MAX_OTHERS = 6  # colours of ghosts
+
+
+def record_comparison(
+    result: Result,
+    *,
+    others: Mapping[str, Result] | None = None,
+    label: str = "",
+    measured: Any = None,
+    **options: Any,
+) -> Recording:
+    """Make the recording of a motion and what it is compared with; see `animation_html`."""
+    recording = record_motion(result, **options)
+    if label and not others:
+        raise ModelError(f"label={label!r} is for a page with others={{...}}; leave it out")
+    if not others and measured is None:
+        return recording
+    others, label = others or {}, label or result.model.name
+    _check_labels(label, others)
+    tables: tuple[ComparisonTable, ...] = ()
+    dots: tuple[MeasuredCurve, ...] = ()
+    source = ""
+    if measured is not None:
+        found = result.compare(measured)
+        names = [name if "." in name else f"{name}.value" for name in found.names]
+        recording = _with_channels(recording, result, names)
+        columns = zip(names, found.units, found.measured.T, strict=True)
+        dots = tuple(MeasuredCurve(name, unit, found.t, values) for name, unit, values in columns)
+        tables, source = (measurement_table(found, names),), Path(found.source).name
+    ghosts = {k: _ghost(other, recording) for k, other in others.items()}
+    changes = {k: result.differences(others[k], *(c.name for c in ghosts[k].channels)) for k in others}
+    tables = (*difference_tables(label, changes), *tables)
+    return replace(recording, compared=Compared(label, ghosts, source, dots, tables))
+
+
+def _check_labels(label: str, others: Mapping[str, Result]) -> None:
+    if len(others) > MAX_OTHERS:
+        raise ModelError(f"{len(others)} other motions are too many for one page; give at most {MAX_OTHERS}")
+    for name in others:
+        if not isinstance(name, str) or not name.strip() or name == label:
+            raise ModelError(f"the label {name!r} of another motion must be a text that differs from {label!r}")
+
+
+def _with_channels(recording: Recording, result: Result, names: Collection[str]) -> Recording:
+    """Return the recording with these curves among its channels, and plotted first."""
+    known = {c.name for c in recording.channels}
+    whole, every, _, _ = motion_to_show(result)
+    more = [(name, *whole.channel(name)) for name in names if name not in known]
+    channels = (Channel(name, unit, np.asarray(values, float)[every]) for name, unit, values in more)
+    plotted = dict.fromkeys([*names, *recording.plotted])
+    return replace(recording, channels=(*recording.channels, *channels), plotted=tuple(plotted))
+
+
+def _ghost(other: Result, recording: Recording) -> Recording:
+    """Return the recording of another motion, with those channels that the first one has in the same unit."""
+    whole, every, _, _ = motion_to_show(other)
+    channels = []
+    for c in recording.channels:
+        if c.name in whole:
+            unit, values = whole.channel(c.name)
+            if unit == c.unit:
+                channels.append(Channel(c.name, unit, np.asarray(values, float)[every]))
+    own = record_motion(other, curves=False, with_notes=False)
+    return replace(own, channels=tuple(channels), sets=(), joints=(), frames=(), curves=())
 
 
 def record_motion(

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from .recording import Channel, RecordedContacts, RecordedSet, Recording, Shape, check_recording, half_extent
+from .recording import Channel, Compared, RecordedContacts, RecordedSet, Recording, Shape, check_recording, half_extent
 
 
 def fill_template(template: str, parts: dict[str, str]) -> str:
@@ -185,6 +185,21 @@ def _header(recording: Recording, block: _NumberBlock) -> dict[str, Any]:
             }
             for f in recording.figures
         ],
+        "compared": None if recording.compared is None else _comparison_data(recording.compared, block),
+    }
+
+
+def _comparison_data(compared: Compared, block: _NumberBlock) -> dict[str, Any]:
+    """Return what a motion is compared with, as plain data."""
+    return {
+        "label": compared.label,
+        "others": [{"label": k, "recording": _header(r, block)} for k, r in compared.others.items()],
+        "source": compared.source,
+        "measured": [
+            {"name": m.name, "unit": m.unit, "t": block.add(m.t, "f8"), "values": block.add(m.values)}
+            for m in compared.measured
+        ],
+        "tables": [asdict(table) for table in compared.tables],
     }
 
 
@@ -303,9 +318,11 @@ PLAYER_MODULES = (
     "swing",
     "modes",
     "overlay",
+    "variants",
+    "compared",
     "main",
 )
-LIVE_MODULES = ("variants", "grip", "transport", "live")
+LIVE_MODULES = ("grip", "transport", "live")
 """Those of a live page, which follow."""
 
 

@@ -282,6 +282,41 @@ class RecordedMode:
 
 
 @dataclass(frozen=True)
+class ComparisonTable:
+    """Columns and rows of texts beside compared motions; a row of ``curves`` is shown while that curve is plotted."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    curves: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeasuredCurve:
+    """Measured values (n,) of a channel, in its unit, at their own times (n,) [s]."""
+
+    name: str
+    unit: str
+    t: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What a motion is compared with on its page.
+
+    ``label`` names the motion itself, ``others`` are other motions by label, which are drawn as ghosts.
+    """
+
+    label: str
+    others: dict[str, Recording] = field(default_factory=dict)
+    source: str = ""  # of the measured values
+    measured: tuple[MeasuredCurve, ...] = ()
+    tables: tuple[ComparisonTable, ...] = ()
+
+
+@dataclass(frozen=True)
 class Recording:
     """One motion, ready for display."""
 
@@ -309,6 +344,7 @@ class Recording:
     marks: tuple[Mark, ...] = ()  # marks of events
     speed: float = 1.0  # seconds of motion in a second of playing, when the page opens
     remark: str = ""  # shown over the picture
+    compared: Compared | None = None
 
 
 SHOW_OPTIONS = {

@@ -16,7 +16,7 @@ from ..model.joint import Joint
 from ..model.model_files import dumps
 from ..results.events import EventRecord, Moment
 from ..results.wording import tuple_text
-from .animation import attachment_text, motion_to_show, record_motion
+from .animation import attachment_text, motion_to_show, record_comparison
 from .figures import standard_figures
 from .page import player_page
 from .recording import Channel, Figure
@@ -360,7 +360,7 @@ def report_html(result: Result, **options: Any) -> str:
     ----------
     result : Result
     **options
-        ``paths`` and ``show``, as in `flyball.view.animation.animation_html`.
+        As in `flyball.view.animation.animation_html`.
 
     Returns
     -------
@@ -372,7 +372,7 @@ def report_html(result: Result, **options: Any) -> str:
     ModelError
         If there is no output time, so nothing to draw.
     """
-    recording = record_motion(result, **options)
+    recording = record_comparison(result, **options)
     whole, every, _, _ = motion_to_show(result)
     chosen = tuple(_thinned_figure(f, every) for f in standard_figures(whole))
     parts = report_tables(result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from .plotting import (
     DASH_STYLES,
     LEGEND_BESIDE,
     PALETTE,
+    axis_label,
     finish_figure,
     new_figure,
     panels_over_time,
@@ -30,7 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from ..results.comparison import Comparison
+    from ..results.measurements import MeasurementComparison
     from ..results.result import Result
+    from ..results.spectrum import Spectrum
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> list[Path]:
@@ -179,6 +183,74 @@ def _curves_of(result: Result, name: str) -> list[Channel]:
 def write_standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
     """Write the standard pictures into an existing folder; return their paths."""
     return write_pictures(standard_pictures(result), Path(folder))
+
+
+AXIS_ROOM = 0.05  # of the range of values, left free above and below
+
+
+def measurement_plot(comparison: MeasurementComparison, path: str | os.PathLike | None = None) -> Any:
+    """Draw curves of a motion with the measured values as dots; see `plot_curves`."""
+    whole = motion_with_event_states(comparison.result)
+    curves = [Channel(name, *whole.curve(name)) for name in comparison.names]
+    measured = dict(zip(comparison.names, comparison.measured.T, strict=True))
+    with plot_style():
+        panels = tuple(replace(p, note="dots: measured") for p in panels_by_unit(curves, len(curves)))
+        drawing = panels_over_time(whole.t, panels, marks=event_marks(comparison.result))
+        for ax, panel in zip(drawing.axes, panels, strict=True):
+            for line, c in zip(ax.lines[: len(panel.curves)], panel.curves, strict=True):
+                points = measured[c.name]
+                room = AXIS_ROOM * np.nanmax([np.ptp(c.values), np.nanmax(points) - np.nanmin(points)])
+                low, high = ax.get_ylim()
+                ax.plot(comparison.t, points, "o", color=line.get_color(), markersize=3.5)
+                ax.set_ylim(min(low, np.nanmin(points) - room), max(high, np.nanmax(points) + room))
+        set_title(drawing, f"{comparison.result.model.name}: measured and computed")
+        return finish_figure(drawing, path)
+
+
+DENSITY_DECADES = 12  # shown below the largest power spectral density
+
+
+def spectrum_plot(spectrum: Spectrum, path: str | os.PathLike | None = None) -> Any:
+    """Draw amplitude spectra, and power spectral densities (logarithmic) over frequency; a row for each unit.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Returns
+    -------
+    Figure, or None where a file was written.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written.
+    """
+    units = list(dict.fromkeys(spectrum.units))
+    with plot_style():
+        drawing = new_figure(0.9 + 2.7 * len(units), 11.0)
+        for (left, right), unit in zip(drawing.subplots(len(units), 2, squeeze=False), units, strict=True):
+            own = [k for k, u in enumerate(spectrum.units) if u == unit]
+            for i, k in enumerate(own):
+                left.plot(spectrum.frequency, spectrum.amplitude[:, k], label=spectrum.names[k], **_curve_style(i))
+                density = np.where(spectrum.density[:, k] > 0.0, spectrum.density[:, k], np.nan)
+                right.plot(spectrum.density_frequency, density, **_curve_style(i))
+            left.set_ylabel(axis_label("amplitude", unit))
+            left.set_ylim(bottom=0.0)
+            left.legend(loc="upper right")
+            right.set_ylabel(axis_label("density", spectrum.density_units[own[0]].replace("^2", "²")))
+            if (most := spectrum.density[:, own].max()) > 0.0:
+                right.set_yscale("log")
+                low, high = right.get_ylim()
+                right.set_ylim(max(low, most * 10.0**-DENSITY_DECADES), high)
+            for ax in (left, right):
+                ax.set_xscale("log")
+                ax.set_xlim(spectrum.frequency[1], spectrum.frequency[-1])
+                ax.set_xlabel("frequency [Hz]")
+        set_title(drawing, f"Spectrum, window {spectrum.window}")
+        return finish_figure(drawing, path)
 
 
 SMALLEST_SHOWN = 1e-18  # value drawn for a violation of zero

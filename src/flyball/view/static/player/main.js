@@ -1,6 +1,7 @@
 // The player: reads a recording, builds the page's parts and keeps them at one time.
 import { controlBar } from "./bar.js";
 import { Clock } from "./clock.js";
+import { Compared } from "./compared.js";
 import { extendRecording, readRecording } from "./data.js";
 import { drawFigures, reportButtons } from "./report.js";
 import { motionPoints } from "./framing.js";
@@ -122,7 +123,9 @@ function margins() {
 /** The picture, without what steers it. */
 function buildPicture(recording, { unit, extent }) {
   const mechanism = new Mechanism(recording, unit, extent);
-  const stage = new Stage(find(".stage"), mechanism, motionPoints(recording, unit), margins);
+  const every = [recording, ...(recording.compared?.others ?? []).map((other) => other.recording)];
+  const points = every.flatMap((one) => motionPoints(one, unit));
+  const stage = new Stage(find(".stage"), mechanism, points, margins);
   if (!stage.renderer) message("No picture: this browser has WebGL switched off. Plots and the time cursor work.");
   find(".stage").addEventListener("stage-lost", () =>
     message("The browser took the picture's WebGL away. Reload the page."),
@@ -307,16 +310,21 @@ export class Player {
     const clock = (this.clock = new Clock(t[0], t.at(-1), () => this.update()));
     clock.speed = recording.speed;
     const seek = (time) => clock.seek(time);
-    const plots = (this.plots = new Plots(find(".plots"), t, seek, recording.marks));
+    const { compared } = recording;
+    const plots = (this.plots = new Plots(find(".plots"), t, seek, recording.marks, compared?.measured ?? []));
     this.figures = drawFigures(recording, seek);
     const keys = new Keys(find(".player"), find(".help"), !find(".report"));
     this.bar = controlBar(find(".bar"), clock, keys, recording.marks);
+    if (compared?.others.length) find(".picker [name=together]").checked = false; // the curves of each name in one plot
     plots.picker = channelPicker(
       find(".picker"),
       find(".pick"),
       recording.channels,
       recording.shown,
-      (channels, together) => plots.show(channels, together),
+      (channels, together) => {
+        plots.show(channels, together);
+        this.compared?.show(new Set(channels.map(({ name }) => name)));
+      },
     );
     this.modes = modeList(recording, clock, keys, this.bar, () => this.update());
     Object.assign(this, choosing(picture, recording, plots, () => picture.mechanism.arrows.frame));
@@ -324,15 +332,23 @@ export class Player {
     this.#switchOn(wanted.show ?? recording.show);
     this.shown.scale(wanted.arrows);
     stage.resize(); // the legend of forces takes room
+    find(".compared").hidden = !compared;
     summary(find(".summary"), recording.notes);
     themeSwitch(find(".theme"), wanted.theme, (theme) => this.#retheme(theme));
     this.#prepareControls(keys, wanted);
     this.modes?.open(wanted.mode);
+    if (compared) this.#compare(compared);
     this.update();
     begin(clock, wanted);
     if (wanted.select) this.chosen.select(picture.mechanism.parts(wanted.select)[0] ?? null);
     window.flyball = hooks(this);
     keepDrawing(clock, picture);
+  }
+
+  #compare(compared) {
+    this.compared = new Compared(this, compared, find);
+    this.compared.variants.changed();
+    this.compared.show(new Set(this.plots.asked[0].map(({ name }) => name)));
   }
 
   #switchOn(names) {
@@ -365,6 +381,7 @@ export class Player {
     this.card.seek(frame);
     this.bar.refresh();
     picture.stage.dirty = true;
+    this.compared?.seek(clock.time);
     this.onUpdate?.(clock.time);
   }
 
@@ -454,6 +471,8 @@ function hooks(player) {
     paths: () =>
       picture.mechanism.trails.map(({ name, trail }) => ({ name, points: trail?.points.map((p) => p.toArray()) ?? [] })),
     camera: () => ({ position: stage.camera.position.toArray(), target: stage.controls.target.toArray() }),
+    ghosts: () =>
+      (player.compared?.variants.kept ?? []).map(({ label, colour, hidden, mechanism }) => ({ label, colour, hidden, pose: mechanism.pose() })),
     slack: () => picture.mechanism.lines.filter(({ state }) => state?.slack).map(({ name }) => name),
     /** Where something on a body is in the picture [px]. */
     pixel(body, position = [0, 0, 0]) {

@@ -199,10 +199,10 @@ const unbroken = (text) => text.replace(/(\d)e-(\d)/g, "$1e\u2011$2"); // a numb
 export function summary(details, notes, first = true) {
   const entries = Object.entries(notes);
   details.hidden = !entries.length;
-  const live = Boolean(document.querySelector(".live"));
+  const taken = Boolean(document.querySelector(".live, .compared:not([hidden])")); // the room for the summary
   if (first)
     details.open =
-      !live && (details.parentElement.clientHeight >= ENOUGH || document.body.matches(".plotless:not(.has-modes)"));
+      !taken && (details.parentElement.clientHeight >= ENOUGH || document.body.matches(".plotless:not(.has-modes)"));
   details
     .querySelector("dl")
     .replaceChildren(

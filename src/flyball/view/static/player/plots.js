@@ -13,6 +13,7 @@ const MOST = CURVES.length; // curves in one plot
 const DASHES = [undefined, [7, 7], [2, 5], [10, 4, 2, 4]]; // of a curve that lies on none, one, two, ... others
 const SPREAD = 15; // a plot's height over the least that a curve in it varies by, at most
 const LEVEL = 2e-3;
+const DOT = 2.2; // px, radius of a measured value
 const CLOSE = 0.006; // curves nearer than this part of the plot's height hide one another
 
 /** The least and the largest of a channel's values. */
@@ -56,6 +57,24 @@ export function grouped(channels, together) {
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const gapped = (values) =>
   values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : null));
+
+/** Measured values as dots over a plot's curves, where they lie within its times. */
+function drawDots(chart, dots, colour) {
+  const { ctx, bbox } = chart;
+  ctx.save();
+  ctx.fillStyle = colour;
+  ctx.beginPath();
+  for (const { t, values } of dots)
+    values.forEach((value, k) => {
+      if (!Number.isFinite(value)) return;
+      const [x, y] = [chart.valToPos(t[k], "x", true), chart.valToPos(value, "y", true)];
+      if (x < bbox.left - 1 || x > bbox.left + bbox.width + 1) return;
+      ctx.moveTo(x + DOT * devicePixelRatio, y);
+      ctx.arc(x, y, DOT * devicePixelRatio, 0, 2 * Math.PI);
+    });
+  ctx.fill();
+  ctx.restore();
+}
 
 /** A constant curve still gets some room above and below, and one in the noise is not blown up. */
 function valueRange(_, low, high) {
@@ -113,8 +132,9 @@ function valuesAt(motion, { name, unit }, times) {
 
 export class Plot {
   /** One plot with its own head line, cursor and markers; `title` says what its axis shows, `marks` are drawn over it. */
-  constructor(parent, channels, times, onSeek, title, marks, motions = []) {
-    Object.assign(this, { channels, times, marks, motions, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
+  constructor(parent, channels, times, onSeek, title, marks, motions = [], measured = []) {
+    const dots = measured.filter(({ name, unit }) => channels.some((c) => c.name === name && c.unit === unit));
+    Object.assign(this, { channels, times, marks, motions, dots, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
     this.values = channels.map(() => element("output", { className: "value" }));
     const names = channels.map((channel, k) => {
       const swatch = element("span", { className: "swatch" });
@@ -125,6 +145,9 @@ export class Plot {
       const name = element("span", { className: "name", textContent: channel.name, title: channel.name });
       return element("span", { className: "curve" }, swatch, name, this.values[k]);
     });
+    this.beside = channels.length === 1 ? motions.map(() => element("output", { className: "value beside" })) : [];
+    this.beside.forEach((value, k) => (value.style.color = motions[k].colour));
+    if (this.beside.length) names[0].append(...this.beside);
     this.power = powerOf(channels.map(rangeOf).flat());
     const shown = [this.power ? `10${raised(this.power)}` : "", pretty(channels[0].unit)].filter(Boolean).join(" ");
     const unit = element("span", { className: "unit", textContent: `${title} ${shown ? `[${shown}]` : ""}`.trim() });
@@ -142,7 +165,7 @@ export class Plot {
     const { channels, times } = this;
     const own = channels.map(({ values }) => gapped(values));
     const others = this.motions.flatMap((motion) => channels.map((channel) => valuesAt(motion, channel, times)));
-    return [times, ...own, ...others];
+    return [times, ...others, ...own]; // this motion's curves lie over the others
   }
 
   #options() {
@@ -160,10 +183,13 @@ export class Plot {
       padding: [8 + this.marks.room, 12, 0, 0],
       cursor: { show: false },
       legend: { show: false },
-      hooks: { drawAxes: [(chart) => this.marks.draw(chart, css("--event"))] },
+      hooks: {
+        drawAxes: [(chart) => this.marks.draw(chart, css("--event"))],
+        draw: [(chart) => this.dots.length && drawDots(chart, this.dots, css("--ink"))],
+      },
       scales: {
         x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
-        y: { range: valueRange },
+        y: { range: (chart, low, high) => valueRange(chart, ...this.#withDots(low, high)) },
       },
       axes: [
         { ...axis, size: 22, gap: 4, space: 56, values: labels },
@@ -171,6 +197,7 @@ export class Plot {
       ],
       series: [
         {},
+        ...this.motions.flatMap(({ colour }) => this.channels.map(() => ({ stroke: colour, width: 1.2, pxAlign: 0, points: { show: false } }))),
         ...this.channels.map((_, k) => ({
           stroke: CURVES[k % CURVES.length],
           dash: this.dashes[k],
@@ -178,9 +205,14 @@ export class Plot {
           pxAlign: 0,
           points: { show: this.times.length === 1 },
         })),
-        ...this.motions.flatMap(({ colour }) => this.channels.map(() => ({ stroke: colour, width: 1.2, pxAlign: 0, points: { show: false } }))),
       ],
     };
+  }
+
+  /** A range of values that holds the measured ones too. */
+  #withDots(low, high) {
+    const ranges = this.dots.map(({ values }) => rangeOf({ values: values.filter(Number.isFinite) }));
+    return low === null ? [low, high] : [Math.min(low, ...ranges.map(([a]) => a)), Math.max(high, ...ranges.map(([, b]) => b))];
   }
 
   #addCursor(onSeek) {
@@ -225,6 +257,7 @@ export class Plot {
       markers[k].hidden = !Number.isFinite(value);
       if (!markers[k].hidden) markers[k].style.transform = `translate(${x}px, ${chart.valToPos(value, "y")}px)`;
     });
+    this.beside.forEach((output, k) => (output.textContent = shortNumber(valuesAt(this.motions[k], channels[0], [time])[0])));
   }
 
   destroy() {
@@ -235,8 +268,8 @@ export class Plot {
 
 export class Plots {
   /** All plots in an element; `onSeek(time)` is called when the user points at a time. */
-  constructor(box, times, onSeek, marks = []) {
-    Object.assign(this, { box, times, onSeek, marks, plots: [], last: null, motions: [] });
+  constructor(box, times, onSeek, marks = [], measured = []) {
+    Object.assign(this, { box, times, onSeek, marks, measured, plots: [], last: null, motions: [] });
     this.empty = element("p", { className: "empty", textContent: "No channel is shown. Choose some above." });
     new ResizeObserver(() => this.resize()).observe(box);
   }
@@ -253,7 +286,9 @@ export class Plots {
     const groups = grouped(channels, together);
     for (const plot of this.plots) plot.destroy();
     const marks = (k) => new Marks(this.marks, k === 0 ? LANES : 0);
-    this.plots = groups.map((group, k) => new Plot(this.box, group, this.times, this.onSeek, "", marks(k), this.motions));
+    this.plots = groups.map(
+      (group, k) => new Plot(this.box, group, this.times, this.onSeek, "", marks(k), this.motions, this.measured),
+    );
     if (groups.length) this.empty.remove();
     else this.box.append(this.empty);
     this.resize();

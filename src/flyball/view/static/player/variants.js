@@ -33,17 +33,47 @@ function fade(mechanism, colour) {
 }
 
 export class Variants {
-  /** The kept motions of a player, listed in a box. */
+  /** Other motions beside the player's, listed in a box: kept ones that can be dropped, or given ones to show or hide. */
   constructor(player, box) {
     Object.assign(this, { player, box, kept: [] });
   }
 
   /** Keep the motion on the page under a label. */
   keep(label) {
+    if (this.kept.length === COLOURS.length) this.drop(this.kept[0]);
+    const variant = this.#add(label, this.player.recording);
+    const close = element("button", { type: "button", textContent: "×", title: `Drop ${label}`, aria: { label: `Drop ${label}` } });
+    close.addEventListener("click", () => this.drop(variant));
+    variant.row.append(close);
+    this.changed();
+  }
+
+  /** Show another recording under a label; a click on it hides it. Returns its colour. */
+  give(label, recording) {
+    const variant = this.#add(label, recording);
+    const { row } = variant;
+    Object.assign(row, { role: "button", tabIndex: 0, title: `Show or hide ${label}` });
+    row.setAttribute("aria-pressed", "true");
+    const toggle = () => {
+      variant.hidden = !variant.hidden;
+      row.setAttribute("aria-pressed", String(!variant.hidden));
+      variant.mechanism.root.visible = !variant.hidden;
+      this.changed();
+    };
+    row.addEventListener("click", toggle);
+    row.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      event.stopPropagation();
+      toggle();
+    });
+    return variant.colour;
+  }
+
+  #add(label, from) {
     const { player, kept } = this;
-    if (kept.length === COLOURS.length) this.drop(kept[0]);
     const colour = COLOURS.find((one) => kept.every((other) => other.colour !== one));
-    const recording = copied(player.recording, colour);
+    const recording = copied(from, colour);
     const { unit, extent } = player.measures;
     const mechanism = new Mechanism(recording, unit, extent);
     mechanism.retheme(player.theme);
@@ -52,12 +82,10 @@ export class Variants {
     const swatch = element("span", { className: "swatch" });
     swatch.style.background = colour;
     const name = element("span", { className: "name", textContent: label, title: label });
-    const close = element("button", { type: "button", textContent: "×", title: `Drop ${label}`, aria: { label: `Drop ${label}` } });
-    const variant = { label, colour, recording, mechanism, row: element("li", {}, swatch, name, close) };
-    close.addEventListener("click", () => this.drop(variant));
+    const variant = { label, colour, recording, mechanism, hidden: false, row: element("li", {}, swatch, name) };
     this.box.append(variant.row);
     kept.push(variant);
-    this.#changed();
+    return variant;
   }
 
   drop(variant) {
@@ -65,17 +93,21 @@ export class Variants {
     variant.row.remove();
     variant.mechanism.root.removeFromParent();
     variant.mechanism.dispose();
-    this.#changed();
+    this.changed();
   }
 
-  #changed() {
+  /** Draw the curves of the motions that are shown. */
+  changed() {
     const { plots, clock } = this.player;
     plots.overlay(
-      this.kept.map(({ colour, recording }) => ({
-        colour,
-        times: recording.t,
-        values: new Map(recording.channels.map(({ name, unit, values }) => [`${name} ${unit}`, values])),
-      })),
+      this.kept
+        .filter(({ hidden }) => !hidden)
+        .map(({ label, colour, recording }) => ({
+          label,
+          colour,
+          times: recording.t,
+          values: new Map(recording.channels.map(({ name, unit, values }) => [`${name} ${unit}`, values])),
+        })),
     );
     this.seek(clock.time);
   }
