@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ from ..engine.kinematics import retract
 from ..errors import ModelError
 from ..model.body import Body
 from ..model.model import Model
-from ..results.part_views.bodies import SET_MOTION_ARRAYS
 from ..results.result import Result
 from ..simulation.measurement import motion_through_states
 
@@ -101,10 +99,7 @@ class AssemblyDrag:
         self._q, _ = c.take(other, self._t, start.q[index].copy(), np.zeros(start.v.shape[1]))
         self._still = np.zeros(c.structure.nv)
         self._joined = np.array([r.element.category != "drivers" for r in c.structure.rows], bool)
-        self._sets = {
-            name: dataclasses.replace(m, **{k: getattr(m, k)[index : index + 1] for k in SET_MOTION_ARRAYS})
-            for name, m in start.bulk.items()
-        }
+        self._sets = {name: m.at_times(slice(index, index + 1)) for name, m in start.bulk.items()}
         self.closure = self._residual()
 
     def move(self, target: DragTarget) -> Result:
