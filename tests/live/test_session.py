@@ -301,6 +301,7 @@ def exchanged(session, messages: list[str]) -> tuple[str, int]:
 def test_only_invalid_messages_in_succession_close_a_page():
     m = falling()
     m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))))
+    assert Page(m).newest["model"]["movable"] == ["stone"]
     drag = json.dumps({"do": "drag", "body": "floor", "at": [0, 0, 0], "to": [1, 0, 0], "by": "assembly"})
     assert exchanged(Page(m).session, [drag] * 200) == ("no more messages", 200)
     mixed = ["nonsense"] * MAX_INVALID_MESSAGES + ['{"do": "pause"}']

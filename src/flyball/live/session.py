@@ -279,6 +279,7 @@ class LiveSession:
                 "name": model.name,
                 "planar": model.planar,
                 "watched": self._file is not None,
+                "movable": [b.name for b in model.bodies],
                 "sliders": [dataclasses.asdict(x) for x in new.values()],
             },
         )

@@ -53,7 +53,7 @@ class LiveStepping:
 
     def __init__(self, model: Model, sliders: Mapping[str, Slider], dt: float) -> None:
         self.dt, self._planar = dt, model.planar
-        parameters = {name: x.quantity for name, x in sliders.items()}
+        parameters: dict[str, Any] = {name: x.quantity for name, x in sliders.items()}
         c = self._absolute = compile_mechanism(model.snapshot(), parameters=parameters, solved=False)
         out, self._wrenches = _with_wrenches(
             model, [b.name for b in model.bodies][:MAX_PULLED_BODIES], c.structure.points
