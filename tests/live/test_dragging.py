@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.live.body_points import connected_mass, effective_mass
 from flyball.live.dragging import AssemblyDrag, DragTarget
 from flyball.live.options import make_sliders
-from flyball.live.stepping import SPRING_PHASE, LiveStepping
+from flyball.live.stepping import SPRING_FREQUENCY, LiveStepping
 from tests.live.pages import FOUR_BAR, Page
 from tests.mechanisms import bricard, example
 
@@ -129,11 +131,11 @@ def pull(x: LiveStepping, at: DragTarget, steps: int) -> fb.Result:
 
 
 def test_a_pulled_body_hangs_below_the_mouse_by_its_weight_over_the_stiffness():
-    """k = m w^2 with w = SPRING_PHASE / dt: it hangs by g / w^2."""
+    """k = m w^2 with w = SPRING_FREQUENCY / dt: it hangs by g / w^2."""
     dt = 1 / 60
     x = LiveStepping(stone(-9.81), {}, dt)
     result = pull(x, target("stone", (0, 0, 0), (0.5, 0.2, 0), True), 400)
-    sag = 9.81 * (dt / SPRING_PHASE) ** 2
+    sag = 9.81 * (dt / SPRING_FREQUENCY) ** 2
     np.testing.assert_allclose(result["stone"].position[-1], [0.5, 0.2 - sag], atol=1e-6)
     assert np.abs(result["stone"].velocity[-1]).max() < 1e-6
 
@@ -161,7 +163,7 @@ def test_pulling_is_stable_for_bodies_in_mechanisms(name):
     assert np.abs(result[body].position).max() < 10.0
 
 
-def test_a_driven_body_does_not_give_way():
+def test_a_driven_body_cannot_be_pulled():
     page = Page(fb.load(FOUR_BAR))
     page.ask("start")
     page.session.receive('{"do": "drag", "body": "crank", "at": [0, 0.1, 0], "to": [1, 1, 0], "by": "force", "t": 0}')
@@ -169,7 +171,86 @@ def test_a_driven_body_does_not_give_way():
         if "error" in page.ask("shown"):
             break
         time.sleep(0.02)
-    assert "does not give way at this point: joints or drivers hold it" in page.text
+    assert "cannot be pulled at this point: its joints and drivers leave it no motion" in page.text
+
+
+def pendulum() -> fb.Mechanism:
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81))
+    m.add(
+        fb.Body("rod", mass=2.0, inertia=0.3, com=(0.5, 0), position=(0, 0)),
+        fb.Revolute("A", "ground", "rod", at=(0, 0)),
+    )
+    return m
+
+
+def test_the_effective_mass_of_a_pinned_rod_is_its_moment_of_inertia_over_the_squared_distance():
+    m = fb.Mechanism("rod", planar=True)
+    m.add(
+        fb.Body("rod", mass=2.0, inertia=0.3, com=(0.5, 0), position=(0, 0)),
+        fb.Revolute("A", "ground", "rod", at=(0, 0)),
+    )
+    c = compile_mechanism(m.snapshot(), solved=False)
+    c.at(0.0, c.values.q, np.zeros(3))
+    about_the_pin = 0.3 + 2.0 * 0.5**2
+    for r in (0.1, 0.5, 1.5):
+        assert effective_mass(c, "rod", np.array([r, 0, 0])) == pytest.approx(about_the_pin / r**2, rel=1e-12)
+    assert effective_mass(c, "rod", np.zeros(3)) == np.inf
+    assert connected_mass(c, "rod") == 2.0
+
+
+def slider_crank(angle: float) -> fb.Mechanism:
+    m = fb.Mechanism("slider crank", planar=True, gravity=(0, 0))
+    m.add(fb.Body("crank", mass=1, position=(0, 0), com=(0.1, 0), inertia=0.01))
+    m.add(fb.Body("rod", mass=1, position=(0.2, 0), com=(0.3, 0), inertia=0.02))
+    m.add(fb.Body("slider", mass=0.5, position=(0.8, 0), inertia=1e-3))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=(0.2, 0)))
+    m.add(fb.Revolute("C", "rod", "slider", at=(0.8, 0)))
+    m.add(fb.Prismatic("D", "ground", "slider", at=(0.8, 0), axis=(1, 0)), fb.Initial("A.angle", value=angle, rate=0))
+    return m
+
+
+@pytest.mark.parametrize("angle", [0.003, 0.02, 0.2])
+def test_a_slider_pulled_from_near_its_dead_centre_comes_to_the_mouse(angle):
+    """The energy is at most that of the spring with the mass of all bodies, at the distance of the start."""
+    dt = 1 / 60
+    x = LiveStepping(slider_crank(angle), {}, dt)
+    result = pull(x, target("slider", (0, 0, 0), (0.6, 0, 0), True), 600)
+    assert result["slider"].position[-1, 0] == pytest.approx(0.6, abs=1e-6)
+    spring = 0.5 * 2.5 * (SPRING_FREQUENCY / dt * 0.2) ** 2
+    assert 0.0 < result.energy.kinetic.max() < spring
+    assert result.energy.kinetic[-1] < 1e-12 * spring
+
+
+def test_a_box_that_rests_on_the_floor_with_friction_is_pulled_and_lifted():
+    m = fb.Mechanism("box", gravity=(0, 0, -9.81))
+    m.add(fb.Body("box", mass=1, position=(0, 0, 0.1), inertia=(0.01, 0.01, 0.01), shape=fb.Box(edges=(0.2, 0.2, 0.2))))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.5))
+    dt = 1 / 60
+    x = LiveStepping(m, {}, dt)
+    result = pull(x, target("box", (0, 0, 0), (1.0, 0, 0.5), True), 200)
+    sag = 9.81 * (dt / SPRING_FREQUENCY) ** 2
+    np.testing.assert_allclose(result["box"].position[-1], [1.0, 0, 0.5 - sag], atol=2e-3)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_point_mass_is_stepped_and_pulled(planar):
+    m = fb.Mechanism("point", planar=planar, gravity=(0, -9.81) if planar else (0, -9.81, 0))
+    m.add(fb.Body("p", mass=2, inertia=0))
+    x = LiveStepping(m, {}, 1 / 60)
+    fall = x.motion([x.advance({}, None, 1, 1.0)[-1] for _ in range(6)])
+    assert fall["p"].position[-1, 1] == pytest.approx(-0.5 * 9.81 * 0.1**2)
+    hangs = pull(x, target("p", (0, 0, 0), (0.5, 0, 0), True), 400)
+    np.testing.assert_allclose(hangs["p"].position[-1, :2], [0.5, -9.81 * (1 / 60 / SPRING_FREQUENCY) ** 2], atol=1e-6)
+
+
+def test_a_speed_beyond_what_can_be_computed_omits_steps_and_says_so():
+    x = LiveStepping(pendulum(), {}, 1 / 60)
+    x.advance({}, None, 1, 1.0)
+    x.begin_pace()
+    time.sleep(0.01)
+    last = x.advance({}, None, None, 1e9)[-1]
+    assert last.t == x.sample().t < 1e6
+    assert "of real time and not 1e+09" in x.slow_remark()
 
 
 def test_sets_of_bodies_move_while_stepping():

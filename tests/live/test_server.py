@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import flyball as fb
-from flyball.live.server import LARGEST_MESSAGE, MOST_PAGES, LiveServer
-from flyball.live.session import MOST_REFUSED
+from flyball.live.server import MAX_MESSAGE_SIZE, MAX_PAGES, LiveServer, serve_model
+from flyball.live.session import MAX_INVALID_MESSAGES
 from tests.live.pages import FOUR_BAR, options, read
 
 client = pytest.importorskip("websockets.sync.client", reason="websockets is not installed")
@@ -72,6 +74,32 @@ def test_only_the_address_with_the_token_has_the_page(server: LiveServer) -> Non
     assert status(server.address, Host="flyball.example") == 403
 
 
+def test_a_path_that_is_no_text_is_refused(server: LiveServer) -> None:
+    host, port = origin(server).removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port))) as raw:
+        raw.sendall(b"GET /\xff HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert b"".join(iter(lambda: raw.recv(1000), b"")) == b""  # closed without an answer
+    assert status(server.address) == 200
+
+
+def test_the_browser_is_given_a_private_file_and_not_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[tuple[str, str, int]] = []
+
+    def open_page(address: str) -> None:
+        path = Path(urllib.request.url2pathname(address.removeprefix("file://")))
+        opened.append((address, path.read_text(encoding="utf-8"), path.stat().st_mode & 0o777))
+
+    monkeypatch.setattr("webbrowser.open", open_page)
+    monkeypatch.setattr(LiveServer, "run", lambda server: server._server.socket.close())
+    shown: list[str] = []
+    serve_model(lambda: fb.load(FOUR_BAR), options(no_open=False), lambda address, note: shown.append(address))
+    ((address, page, mode),) = opened
+    assert f"url={shown[0]}" in page
+    assert shown[0].rpartition("/")[2] not in address
+    assert mode == 0o600 or sys.platform == "win32"
+    assert not Path(urllib.request.url2pathname(address.removeprefix("file://"))).exists()
+
+
 def test_it_listens_to_this_machine_only(server: LiveServer) -> None:
     assert server.address.startswith("http://127.0.0.1:")
 
@@ -104,18 +132,18 @@ def test_a_flood_is_thinned_to_the_newest(server: LiveServer) -> None:
         assert runs < 1000
 
 
-def test_large_and_senseless_messages_end_that_page_only(server: LiveServer) -> None:
+def test_large_and_invalid_messages_end_that_page_only(server: LiveServer) -> None:
     with connection(server) as other:
         kinds(other, "run")
         with connection(server) as page:
             kinds(page, "run")
-            page.send("x" * (LARGEST_MESSAGE + 1))
+            page.send("x" * (MAX_MESSAGE_SIZE + 1))
             with pytest.raises(exceptions.ConnectionClosed) as closed:
                 page.recv(timeout=30)
             assert closed.value.rcvd.code == 1009
         with connection(server) as page:
             kinds(page, "run")
-            for _ in range(MOST_REFUSED):
+            for _ in range(MAX_INVALID_MESSAGES):
                 page.send("nonsense")
                 assert kinds(page, "error") == ["error"]
             page.send("nonsense")
@@ -127,7 +155,7 @@ def test_large_and_senseless_messages_end_that_page_only(server: LiveServer) -> 
 
 
 def test_a_closed_tab_makes_room(server: LiveServer) -> None:
-    for _ in range(3 * MOST_PAGES):
+    for _ in range(3 * MAX_PAGES):
         with connection(server) as page:
             kinds(page, "model")
             page.send(json.dumps({"do": "start"}))

@@ -11,7 +11,7 @@ import pytest
 
 import flyball as fb
 from flyball.live.options import make_sliders
-from flyball.live.session import slow_remark
+from flyball.live.session import MAX_INVALID_MESSAGES, ClosedPage, exchange_messages, slow_remark
 from tests.live.pages import FOUR_BAR, Page, options
 from tests.mechanisms import example
 
@@ -47,6 +47,7 @@ def test_ranges_are_given_or_chosen_in_the_unit_as_written():
         ({"speed": (2, 1)}, "the first must be less than the second"),
         ({"speed": (1, float("inf"))}, "both finite"),
         ({"speed": ("1 kg", "2 kg")}, "expected"),
+        ({"speed": ("70 rpm", "90 rpm")}, "must contain the parameter's value, '60 rpm': give another range"),
         ({"speed": 3}, "give the least and the largest value"),
         ({"speed": (None, 3)}, "neither a number nor a quantity"),
     ],
@@ -61,7 +62,7 @@ def test_what_is_no_range_is_refused(ranges, told):
     ("given", "told"),
     [
         ({"t_end": 0.0}, "t_end must be greater than 0"),
-        ({"outputs": 1}, "outputs must be at least 2"),
+        ({"outputs": 1}, "outputs is 1; it must be at least 2"),
         ({"port": 70000}, "port is 70000"),
         ({"ranges": [1]}, "ranges"),
     ],
@@ -224,6 +225,24 @@ def test_what_cannot_be_stepped_says_so():
     assert page.text == str(raised.value)
 
 
+@pytest.mark.parametrize(
+    "others",
+    [
+        [{"do": "set", "name": "mass", "value": 3.0}],
+        [{"do": "drag", "body": "stone", "at": [0, 0, 0], "to": [1, 0, 0], "by": "assembly"}],
+    ],
+)
+def test_a_step_with_other_requests_at_once_leaves_no_work_behind(others):
+    page = Page(falling())
+    page.ask("step")
+    for message in [*others, {"do": "step"}, *others]:
+        page.session.receive(json.dumps(message))
+    page.work()
+    page.work()
+    assert page.session.wait() is None
+    assert page.work() == []
+
+
 # ---- messages
 
 
@@ -253,9 +272,43 @@ def test_what_cannot_be_stepped_says_so():
         '{"do": "drag", "body": "crank", "at": [0, 0, 0], "to": [0, 0, 0], "by": "force"}',
     ],
 )
-def test_messages_that_make_no_sense_are_refused_and_change_nothing(text):
+def test_invalid_messages_are_refused_and_change_nothing(text):
     page = Page(fb.load(FOUR_BAR))
     with pytest.raises(fb.ModelError):
         page.session.receive(text)
     assert page.work() == []
     assert page.ask("set", name="speed", value=61) == ["busy", "run"]
+
+
+def exchanged(session, messages: list[str]) -> tuple[str, int]:
+    """Why a page is closed that sends these messages, and how many of them were received."""
+    waiting = iter(messages)
+    received = 0
+
+    def receive(timeout: float | None) -> str:
+        nonlocal received
+        text = next(waiting, None)
+        if text is None:
+            raise ClosedPage("no more messages")
+        received += 1
+        return text
+
+    with pytest.raises(ClosedPage) as closed:
+        exchange_messages(session, receive, lambda _: None)
+    return str(closed.value), received
+
+
+def test_only_invalid_messages_in_succession_close_a_page():
+    m = falling()
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))))
+    assert Page(m).newest["model"]["movable"] == ["stone"]
+    drag = json.dumps({"do": "drag", "body": "floor", "at": [0, 0, 0], "to": [1, 0, 0], "by": "assembly"})
+    assert exchanged(Page(m).session, [drag] * 200) == ("no more messages", 200)
+    mixed = ["nonsense"] * MAX_INVALID_MESSAGES + ['{"do": "pause"}']
+    assert exchanged(Page(m).session, 3 * mixed)[0] == "no more messages"
+    assert exchanged(Page(m).session, ["nonsense"] * 99) == ("too many invalid messages", MAX_INVALID_MESSAGES + 1)
+
+
+def test_a_chosen_range_is_finite():
+    s = make_sliders(fb.Mechanism("m", parameters={"large": 1e308, "negative": -1.5e308}))
+    assert all(np.isfinite([x.low, x.high]).all() and x.low <= x.value <= x.high for x in s.values())

@@ -253,6 +253,34 @@ def test_kept_motions_stay_in_a_colour(live: Open) -> None:
     assert tab.errors == []
 
 
+def test_a_kept_motion_that_was_stepped_is_labelled_with_the_present_values(live: Open) -> None:
+    m = fb.Mechanism("stone", planar=True, parameters={"push": 1.0})
+    m.add(fb.Body("stone", mass=1, inertia=1, position=(0, 0)), fb.PointForce("wind", "stone", force=("push", 0)))
+    tab = live(m)
+    tab.click("[name=step-live]")
+    tab.wait_until("() => flyball.live.pictures > 0")
+    tab.fill("push", 3.0)
+    tab.click("[name=keep-live]")
+    assert tab.locator(".variants .name").all_inner_texts() == ["push 3"]
+
+
+def test_a_value_that_no_answer_follows_is_sent_after_a_while(live: Open) -> None:
+    tab = live(fb.load(FOUR_BAR))
+    tab.after_run(lambda: tab.evaluate("flyball.live.sent = performance.now(); flyball.live.set('speed', 77)"))
+    assert tab.evaluate("flyball.live.values.speed") == 77.0
+
+
+def test_shapes_of_the_ground_are_not_dragged(live: Open) -> None:
+    m = fb.Mechanism("box", gravity=(0, 0, -9.81))
+    m.add(fb.Body("box", shape=fb.Box(edges=(0.1, 0.1, 0.1)), density=1000, position=(1, 0, 0)))
+    m.add(fb.Ground("block", shape=fb.Box(edges=(0.5, 0.5, 0.5))))
+    tab = live(m)
+    tab.pull("block", [0, 0, 0], [50, 20])
+    tab.wait_for_timeout(300)
+    assert tab.fault == ""
+    assert tab.evaluate("flyball.live.pictures") == 0
+
+
 def test_an_edited_file_keeps_the_view_and_a_fault_has_the_words_of_the_terminal(live: Open, tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     text = FOUR_BAR.read_text(encoding="utf-8")

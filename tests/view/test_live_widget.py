@@ -13,7 +13,7 @@ import pytest
 
 import flyball as fb
 from flyball import live
-from flyball.live.widget import FRAME_SCRIPT, Conversation, live_widget
+from flyball.live.widget import FRAME_SCRIPT, MAX_WAITING, WidgetSessions, live_widget
 from flyball.view.page import live_page
 from tests.live.pages import FOUR_BAR, options, read
 
@@ -41,14 +41,14 @@ def test_the_frame_shows_what_the_kernel_computes(browser: Any, tmp_path: Any) -
     import json
 
     sent: queue.Queue[bytes] = queue.Queue()
-    conversation = Conversation(fb.load(FOUR_BAR), options(), sent.put)
+    sessions = WidgetSessions(fb.load(FOUR_BAR), options(), sent.put)
     page = json.dumps(live_page("four-bar")).replace("</", "<\\/")
     path = tmp_path / "notebook.html"
     path.write_text(NOTEBOOK % (page, FRAME_SCRIPT.replace("export default { render };", "")), encoding="utf-8")
     tab = browser.new_page(offline=True)
     errors: list[str] = []
     tab.on("pageerror", lambda error: errors.append(error.message))
-    tab.expose_function("toKernel", conversation.receive)
+    tab.expose_function("toKernel", sessions.receive)
     tab.goto(path.as_uri())
 
     def pass_on(until: str) -> dict[str, Any]:
@@ -95,6 +95,14 @@ def test_a_notebook_gets_a_widget_and_refuses_what_has_no_effect(monkeypatch: py
     widget = live_widget(m, options())
     assert "connect-src" not in widget.page
     assert widget.title == "four-bar, live"
+
+
+def test_the_oldest_of_too_many_waiting_messages_are_dropped() -> None:
+    sessions = WidgetSessions(fb.load(FOUR_BAR), options(), lambda _: None)
+    for k in range(MAX_WAITING + 5):
+        sessions.receive(str(k))
+    waiting = list(sessions._waiting.queue)
+    assert (len(waiting), waiting[0], waiting[-1]) == (MAX_WAITING, "5", str(MAX_WAITING + 4))
 
 
 def test_without_the_package_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

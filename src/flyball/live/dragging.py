@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,23 +13,24 @@ from ..engine.kinematics import retract
 from ..errors import ModelError
 from ..model.body import Body
 from ..model.model import Model
-from ..results.part_views.bodies import SET_MOTION_ARRAYS
 from ..results.result import Result
 from ..simulation.measurement import motion_through_states
+from .body_points import RANK_TOLERANCE, point_kinematics
+from .messages import InvalidMessage, finite_number
 
-CLOSED = 1e-12
-"""Residual of closed joints, in lengths of the mechanism or radians: positions beyond ten times it are not shown."""
-MOST_STEPS = 12
+CLOSURE_TOLERANCE = 1e-12
+"""Residual of closed joints, in lengths of the mechanism or radians, at which Newton's method ends."""
+MAX_RESIDUAL = 1e-11
+"""Residual of positions that are shown: what rounding may leave above the tolerance."""
+MAX_STEPS = 12
 """Steps towards one position of the mouse; the next position continues from there."""
-MOST_CLOSING = 8
-LONGEST_STEP = 0.2
+MAX_CLOSURE_ITERATIONS = 8
+MAX_STEP = 0.2
 """Largest change of a coordinate in one step [rad or lengths of the mechanism]: farther ones may change the branch."""
-SHORTEST_STEP = 1e-9
+MIN_STEP = 1e-9
 DAMPING = 1e-2
 """Damping of the steps, relative to a motion of the point by a length of the mechanism for a radian."""
-RANK = 1e-9
-"""Singular values of the constraints below this part of the largest are dependences."""
-MOST_COORDINATE = 1e9
+MAX_COORDINATE = 1e9
 """Largest coordinate of a point that is accepted [m]."""
 
 
@@ -50,8 +50,10 @@ class DragTarget:
 
         Raises
         ------
+        InvalidMessage
+            If a number is missing or not finite, or the way of dragging is unknown.
         ModelError
-            If there is no such body, or a number is missing or not finite.
+            If there is no such body.
         """
         name = message.get("body")
         body = model.find(name) if model is not None and isinstance(name, str) else None
@@ -59,21 +61,18 @@ class DragTarget:
             raise ModelError(f"{str(name)[:80]!r} cannot be dragged: it is no body with joints or forces of its own")
         by = message.get("by")
         if by not in ("assembly", "force"):
-            raise ModelError(f"a body is dragged by 'assembly' or by 'force', not by {str(by)[:40]!r}")
-        t = _finite([message.get("t", 0.0)], 1, "t")[0]
-        at, to = (_finite(message.get(k), 3, k) for k in ("at", "to"))
+            raise InvalidMessage(f"a body is dragged by 'assembly' or by 'force', not by {str(by)[:40]!r}")
+        t = finite_number(message.get("t", 0.0), "t of a dragged body")
+        at, to = (_position(message.get(k), f"{k} of a dragged body") for k in ("at", "to"))
         if model is not None and model.planar:
             at[2] = to[2] = 0.0
-        return cls(body.name, at, to, by == "force", float(t))
+        return cls(body.name, at, to, by == "force", t)
 
 
-def _finite(values: Any, count: int, name: str) -> np.ndarray:
-    good = isinstance(values, list) and len(values) == count
-    if not good or not all(
-        isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < MOST_COORDINATE for x in values
-    ):
-        raise ModelError(f"{name} of a dragged body must be {count} finite numbers below {MOST_COORDINATE:g}")
-    return np.array(values, float)
+def _position(values: Any, what: str) -> np.ndarray:
+    if not isinstance(values, list) or len(values) != 3:
+        raise InvalidMessage(f"{what} is {str(values)[:40]!r}; it must be three numbers")
+    return np.array([finite_number(x, what, -MAX_COORDINATE, MAX_COORDINATE) for x in values])
 
 
 class AssemblyDrag:
@@ -101,10 +100,7 @@ class AssemblyDrag:
         self._q, _ = c.take(other, self._t, start.q[index].copy(), np.zeros(start.v.shape[1]))
         self._still = np.zeros(c.structure.nv)
         self._joined = np.array([r.element.category != "drivers" for r in c.structure.rows], bool)
-        self._sets = {
-            name: dataclasses.replace(m, **{k: getattr(m, k)[index : index + 1] for k in SET_MOTION_ARRAYS})
-            for name, m in start.bulk.items()
-        }
+        self._sets = {name: m.at_times(slice(index, index + 1)) for name, m in start.bulk.items()}
         self.closure = self._residual()
 
     def move(self, target: DragTarget) -> Result:
@@ -118,7 +114,7 @@ class AssemblyDrag:
         if self._compiled.structure.place[target.body] < 0:
             raise ModelError(f"body {target.body!r} cannot be dragged: it is fixed to ground")
         distance = self._distance(target)
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             step = self._step(target)
             nearer = self._nearer(target, step, distance)
             if nearer is None:
@@ -135,23 +131,23 @@ class AssemblyDrag:
         error, J = self._point(target)
         A = J * c.sizes @ free / c.values.length
         largest = float(np.abs(A).max(initial=0.0))
-        if largest < RANK:
+        if largest < RANK_TOLERANCE:
             raise ModelError(f"body {target.body!r} cannot be dragged there: its joints leave that point no motion")
         y = np.linalg.solve(A.T @ A + DAMPING**2 * np.eye(len(A.T)), A.T @ (error / c.values.length))
         step = free @ y
-        return step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max(initial=0.0)), 1e-300))
+        return step * min(1.0, MAX_STEP / max(float(np.abs(step).max(initial=0.0)), 1e-300))
 
     @staticmethod
     def _null_space(G: np.ndarray) -> np.ndarray:
         if not len(G):
             return np.eye(G.shape[1])
         _, s, Vt = np.linalg.svd(G)
-        return Vt[int((s > RANK * s[0]).sum()) :].T
+        return Vt[int((s > RANK_TOLERANCE * s[0]).sum()) :].T
 
     def _nearer(self, target: DragTarget, step: np.ndarray, distance: float) -> float | None:
         """Take the step, or a part of it that brings the point nearer; return the distance, None if there is none."""
         before, z = self._q.copy(), self._compiled.z.copy()
-        while np.abs(step).max(initial=0.0) > SHORTEST_STEP:
+        while np.abs(step).max(initial=0.0) > MIN_STEP:
             self._q = before.copy()
             retract(self._compiled.values.system, self._q, step * self._compiled.sizes)
             if self._close() and (found := self._distance(target)) < distance:
@@ -165,17 +161,17 @@ class AssemblyDrag:
     def _close(self) -> bool:
         """Close all joints from a position nearby by Newton's method; return whether they are closed."""
         c = self._compiled
-        for _ in range(MOST_CLOSING):
-            if self._residual() <= CLOSED:
+        for _ in range(MAX_CLOSURE_ITERATIONS):
+            if self._residual() <= CLOSURE_TOLERANCE:
                 return True
             units = c.row_units[self._joined]
             g = c.work.rows.value[self._joined] / units
             G = c.jacobian()[self._joined] * c.sizes / units[:, None]
-            d = np.linalg.lstsq(G, -g, rcond=RANK)[0]
-            if not np.isfinite(d).all() or np.abs(d).max() > LONGEST_STEP:
+            d = np.linalg.lstsq(G, -g, rcond=RANK_TOLERANCE)[0]
+            if not np.isfinite(d).all() or np.abs(d).max() > MAX_STEP:
                 return False
             retract(c.values.system, self._q, d * c.sizes)
-        return self._residual() <= 10.0 * CLOSED
+        return self._residual() <= MAX_RESIDUAL
 
     def _evaluate(self) -> None:
         self._compiled.at(self._t, self._q, self._still)
@@ -190,18 +186,8 @@ class AssemblyDrag:
 
     def _point(self, target: DragTarget) -> tuple[np.ndarray, np.ndarray]:
         """Return the way from the point to its target (3,), and the point's Jacobian (3, nv), as last evaluated."""
-        c = self._compiled
-        b, tree = c.structure.place[target.body], c.values.system.tree
-        R = c.work.bodies.rotation[b].reshape(3, 3)
-        arm = R @ (target.at - c.values.bodies[target.body].com.real)
-        J = np.zeros((3, c.structure.nv))
-        shifts = 2 if c.structure.model.planar else 3
-        first, n = int(tree.v[b]), int(tree.nv[b])
-        J[:shifts, first : first + shifts] = np.eye(shifts)
-        if n > shifts:
-            cross = -np.cross(arm, np.eye(3)).T  # column k: axis k x arm
-            J[:, first + shifts : first + n] = (cross @ R)[:, -(n - shifts) :]
-        return target.to - c.work.bodies.position[b] - arm, J
+        position, _, J = point_kinematics(self._compiled, target.body, target.at)
+        return target.to - position, J
 
     def _shown(self) -> Result:
         c = self._compiled

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,11 +14,14 @@ from ..model.expressions import parameter_formulas
 from ..model.messages import listing, suggest
 from ..model.model import Model
 from ..model.units import same_kind, split_quantity, to_si
+from .messages import finite_number
 
 CHOSEN_FACTORS = 0.5, 2.0
 """A chosen range of a parameter, relative to its value."""
 CHOSEN_AROUND_ZERO = -1.0, 1.0
 """The chosen range of a parameter whose value is 0, in its unit."""
+RANGE_ROUNDING = 1e-9
+"""Part of a range by which a value may exceed it: units are converted with rounding."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +51,10 @@ class Slider:
 
         Raises
         ------
-        ModelError
+        InvalidMessage
             If the value is not a finite number. One outside the range is accepted: it can be typed.
         """
-        if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
-            raise ModelError(f"parameter {self.name!r} is moved to {str(value)[:40]!r}; it must be a finite number")
-        return replace(self, value=float(value))
+        return replace(self, value=finite_number(value, f"the new value of parameter {self.name!r}"))
 
 
 def make_sliders(model: Model, ranges: Mapping[str, Sequence[Any]] | None = None) -> dict[str, Slider]:
@@ -68,7 +70,7 @@ def make_sliders(model: Model, ranges: Mapping[str, Sequence[Any]] | None = None
     Raises
     ------
     ModelError
-        If a range is given for something else, or is no range.
+        If a range is given for something else, is no range, or does not contain the value.
     """
     given = dict(ranges or {})
     env, formulas = model.environment(), parameter_formulas(model.parameters)
@@ -80,7 +82,7 @@ def make_sliders(model: Model, ranges: Mapping[str, Sequence[Any]] | None = None
         number, unit = split_quantity(written) or ("", "") if isinstance(written, str) else ("", "")
         value = float(number) if unit else float(env[name])
         chosen = name not in given
-        low, high = _chosen_range(value) if chosen else _given_range(name, given.pop(name), written, unit)
+        low, high = _chosen_range(value) if chosen else _given_range(name, given.pop(name), written, unit, value)
         out[name] = Slider(name, unit, value, low, high, chosen)
     for name in given:
         if name in derived:
@@ -93,28 +95,28 @@ def make_sliders(model: Model, ranges: Mapping[str, Sequence[Any]] | None = None
     return out
 
 
-def _is_finite(value: float) -> bool:
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number beyond the range of floats
-        return False
-
-
 def _chosen_range(value: float) -> tuple[float, float]:
     if value == 0.0:
         return CHOSEN_AROUND_ZERO
-    low, high = sorted(factor * value for factor in CHOSEN_FACTORS)
+    largest = sys.float_info.max
+    low, high = sorted(min(max(factor * value, -largest), largest) for factor in CHOSEN_FACTORS)
     return low, high
 
 
-def _given_range(name: str, given: Any, written: Any, unit: str) -> tuple[float, float]:
+def _given_range(name: str, given: Any, written: Any, unit: str, value: float) -> tuple[float, float]:
     where = f"range of parameter {name!r}"
     if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
         raise ModelError(f"{where} is {given!r}; give the least and the largest value, for instance (0.1, 0.5)")
     low, high = (_in_unit(x, written, unit, where) for x in given)
-    if not (_is_finite(low) and _is_finite(high) and low < high):
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ModelError(
             f"{where} is {given[0]!r} to {given[1]!r}; the first must be less than the second, both finite"
+        )
+    rounding = RANGE_ROUNDING * (high - low)
+    if not low - rounding <= value <= high + rounding:
+        raise ModelError(
+            f"{where} is {given[0]!r} to {given[1]!r}; it must contain the parameter's value, {written!r}: give "
+            "another range, or change the value in the model"
         )
     return low, high
 
@@ -130,10 +132,13 @@ def _in_unit(value: Any, written: Any, unit: str, where: str) -> float:
             value = to_si(value, None)
         except UnitError as error:
             raise ModelError(f"{where}: {error}") from None
-    return float(value) / (to_si(f"1 {unit}", None) if unit else 1.0)
+    try:
+        return float(value) / (to_si(f"1 {unit}", None) if unit else 1.0)
+    except OverflowError:  # a whole number beyond the range of floats
+        return math.inf
 
 
-LARGEST_PORT = 65_535
+MAX_PORT = 65_535
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,10 +157,10 @@ class LiveOptions(AnalysisOptions):
         require_positive(self.t_end, "t_end")
         require_count(self.outputs, "outputs")
         if self.outputs < 2:
-            raise ModelError("outputs must be at least 2")
+            raise ModelError(f"outputs is {self.outputs}; it must be at least 2, the start and the end of the motion")
         if not isinstance(self.ranges, Mapping | None):
             raise ModelError(
                 f"ranges maps parameters to (least, largest), for instance {{'mass': (1, 3)}}, not {self.ranges!r}"
             )
-        if isinstance(self.port, bool) or not isinstance(self.port, int) or not 0 <= self.port <= LARGEST_PORT:
-            raise ModelError(f"port is {self.port!r}; it must be 0 (any free port) to {LARGEST_PORT}")
+        if isinstance(self.port, bool) or not isinstance(self.port, int) or not 0 <= self.port <= MAX_PORT:
+            raise ModelError(f"port is {self.port!r}; it must be 0 (any free port) to {MAX_PORT}")

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hmac
 import secrets
+import tempfile
 import threading
 import webbrowser
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -20,15 +21,17 @@ from ..errors import ModelError
 from ..model.model import Model
 from ..view.page import live_page
 from .options import LiveOptions, make_sliders
-from .session import ClosedPage, LiveSession, converse
+from .session import ClosedPage, LiveSession, exchange_messages
 
 HOST = "127.0.0.1"
-LARGEST_MESSAGE = 4096
+MAX_MESSAGE_SIZE = 4096
 """Bytes of a message of the page; a connection with larger ones is closed."""
-MOST_PAGES = 8
+MAX_PAGES = 8
 """Pages open at once: each computes in a thread of its own."""
-CLOSING = 2.0
-"""Time that a page has to close its connection [s]."""
+OPEN_TIMEOUT = 2.0
+"""Time in which a connection must send its request [s]; stopping the server waits for it."""
+CLOSE_TIMEOUT = 2.0
+"""Time in which a page must close its connection [s]."""
 PAGE_HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
@@ -75,7 +78,7 @@ class LiveServer:
             raise ModelError("a live page needs the package websockets: pip install 'flyball[live]'") from None
         self._load, self._options, self._file, self._wording = load, o, file, wording
         self._token = secrets.token_urlsafe(24)
-        self._pages = threading.BoundedSemaphore(MOST_PAGES)
+        self._pages = threading.BoundedSemaphore(MAX_PAGES)
         self._ending = threading.Event()
         model = load()
         make_sliders(model, o.ranges)  # refuses invalid ranges
@@ -86,9 +89,10 @@ class LiveServer:
                 HOST,
                 o.port,
                 process_request=self._process_request,
-                max_size=LARGEST_MESSAGE,
+                max_size=MAX_MESSAGE_SIZE,
                 compression=None,
-                close_timeout=CLOSING,
+                open_timeout=OPEN_TIMEOUT,
+                close_timeout=CLOSE_TIMEOUT,
                 ping_interval=None,  # a page computes for longer than a ping may take; a closed one ends its connection
                 server_header=None,
             )
@@ -143,16 +147,16 @@ class LiveServer:
     def _serve_page(self, connection: Any) -> None:
         """Serve one page until it is closed."""
         if not self._pages.acquire(blocking=False):
-            connection.close(TRY_AGAIN_LATER, f"only {MOST_PAGES} pages at once")
+            connection.close(TRY_AGAIN_LATER, f"only {MAX_PAGES} pages at once")
             return
         try:
-            self._converse(connection)
+            self._exchange_messages(connection)
         except ClosedPage as ended:
             connection.close(POLICY_VIOLATION, str(ended))
         finally:
             self._pages.release()
 
-    def _converse(self, connection: Any) -> None:
+    def _exchange_messages(self, connection: Any) -> None:
         from websockets.exceptions import ConnectionClosed
 
         def receive(timeout: float | None) -> str | bytes:
@@ -169,7 +173,7 @@ class LiveServer:
             except ConnectionClosed:
                 raise ClosedPage from None
 
-        converse(LiveSession(self._load, self._options, self._file, self._wording), receive, send)
+        exchange_messages(LiveSession(self._load, self._options, self._file, self._wording), receive, send)
 
 
 def serve_model(
@@ -185,7 +189,21 @@ def serve_model(
     """
     server = LiveServer(load, o, file, wording)
     show(server.address, "The page is open to this machine only. Ctrl-C ends it.")
-    if not o.no_open:
-        webbrowser.open(server.address)
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt), nullcontext() if o.no_open else _redirect_file(server.address) as redirect:
+        if redirect is not None:
+            webbrowser.open(redirect.as_uri())
         server.run()
+
+
+@contextmanager
+def _redirect_file(address: str) -> Iterator[Path]:
+    """Write a page that leads to an address and that only this user can read.
+
+    The browser gets the path of the file: all users of the machine can read the arguments of a command, and the address
+    contains the token.
+    """
+    with tempfile.TemporaryDirectory(prefix="flyball-") as folder:  # of mode 0700
+        path = Path(folder) / "live.html"
+        path.touch(mode=0o600)
+        path.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">\n', encoding="utf-8")
+        yield path

@@ -5,8 +5,8 @@ message from the page is a JSON object whose ``do`` says what to do:
 
 ========================= =============================================================================
 ``set``                   move the slider ``name`` to ``value``, in its unit
-``start``, ``pause``      step on and on, or stop stepping
-``step``, ``reset``       one step; back to the described start
+``start``, ``pause``      begin or stop to step continuously
+``step``, ``reset``       take one step; return to the initial state of the model
 ``speed``                 seconds of motion in a second, ``value``
 ``drag``                  pull the point ``at`` of ``body`` [m, in its frame] to the point ``to`` [m, world], ``by``
                           ``assembly`` (the mechanism follows, closed) or ``force`` (a spring, while stepping); ``t``
@@ -15,14 +15,14 @@ message from the page is a JSON object whose ``do`` says what to do:
 ``shown``                 the last picture of stepping is drawn: the next one may come
 ========================= =============================================================================
 
-Only the newest of values and points waits to be worked on: a page that sends faster than runs take skips some.
+Only the newest value of a parameter and the newest point of a body are used: of those that arrive during a run, the
+earlier ones are dropped.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import struct
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -39,18 +39,21 @@ from ..view.animation import record_motion
 from ..view.page import pack_recording
 from ..view.recording import Recording
 from .dragging import AssemblyDrag, DragTarget
+from .messages import InvalidMessage, finite_number
 from .options import LiveOptions, Slider, make_sliders
-from .stepping import LiveStepping
+from .stepping import LiveStepping, slow_text
 
-MOST_AT_ONCE = 1000
+MAX_MESSAGES_AT_ONCE = 1000
 """Messages taken before work goes on: a page that never pauses does not stop it."""
-MOST_REFUSED = 50
-"""Messages that make no sense before a page is closed."""
+MAX_INVALID_MESSAGES = 50
+"""Invalid messages without a valid one between them before a page is closed."""
 SLOW_RUN = 1.0
 """Duration of a run [s] from which the page says how slow it is."""
-LOOK_AT_FILE = 0.3
-"""Interval between two looks at the model file [s]."""
-PICTURE = 1.0 / 30.0
+FILE_CHECK_INTERVAL = 0.3
+"""Interval between two checks whether the model file has changed [s]."""
+MAX_SPEED = 1e9
+"""Seconds of motion in a second that can be asked for."""
+PICTURE_INTERVAL = 1.0 / 30.0
 """Interval between two pictures while stepping [s]."""
 KNOWN_ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 """Energies that positions and velocities determine."""
@@ -61,7 +64,7 @@ class ClosedPage(Exception):
 
 
 class SupersededRun(Exception):
-    """A run is ended because a newer value is waiting."""
+    """A run is abandoned because a newer value has arrived."""
 
 
 def encode(kind: str, content: Mapping[str, Any], recording: Recording | None = None) -> bytes:
@@ -97,16 +100,17 @@ class LiveSession:
         wording: Callable[[str], str] = str,
     ) -> None:
         self._load, self._options, self._file, self._wording = load, o, file, wording
-        self._changed, self._looked = _time_of_change(file), time.monotonic()
+        self._changed, self._checked = _time_of_change(file), time.monotonic()
         self.sliders: dict[str, Slider] = {}
         self._result: Result | None = None
         self._stepping: LiveStepping | None = None
         self._drag: AssemblyDrag | None = None
         self._target: DragTarget | None = None
-        self._due: list[str] = ["model", "run"]  # what is to be done, in this order
-        self._playing, self._speed, self._single = False, 1.0, 0
+        self._pending_tasks: list[str] = ["model", "run"]  # in this order
+        self._playing, self._speed, self._steps_requested = False, 1.0, 0
+        self._playback_speed = 1.0
         self._model: Model | None = None
-        self._drag_began, self._drawing, self._refused = 0.0, False, 0
+        self._drag_began, self._drawing, self._invalid_messages = 0.0, False, 0
         self._commands: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "set": self._set,
             "start": self._start,
@@ -126,18 +130,21 @@ class LiveSession:
 
         Raises
         ------
-        ModelError
+        InvalidMessage
             If it is no such message.
+        ModelError
+            If it asks for what is not possible.
         """
         try:
             message = json.loads(text)
         except (ValueError, RecursionError):
-            raise ModelError("a message of the page is not JSON; reload the page") from None
+            raise InvalidMessage("a message of the page is not JSON; reload the page") from None
         command = self._commands.get(str(message.get("do"))) if isinstance(message, dict) else None
         if command is None:
             known = ", ".join(self._commands)
-            raise ModelError(f"a message of the page asks for none of {known}; reload the page")
+            raise InvalidMessage(f"a message of the page asks for none of {known}; reload the page")
         command(message)
+        self._invalid_messages = 0
 
     def _set(self, message: Mapping[str, Any]) -> None:
         name = message.get("name")
@@ -147,26 +154,26 @@ class LiveSession:
         self._drag = self._target = None
         if self._stepping is not None and self._stepping.accepts(name):
             return
-        self._ask("run")
+        self._request("run")
 
     def _start(self, message: Mapping[str, Any]) -> None:
-        self._playing, self._drag, self._drawing = True, None, False
-        self._ask("stepper")
+        self._playing, self._drag, self._target, self._drawing = True, None, None, False
+        self._request("stepper")
 
     def _pause(self, message: Mapping[str, Any]) -> None:
         self._playing = False
 
     def _step(self, message: Mapping[str, Any]) -> None:
-        self._playing, self._single, self._drag = False, 1, None
-        self._ask("stepper")
+        self._playing, self._steps_requested, self._drag, self._target = False, 1, None, None
+        self._request("stepper")
 
     def _reset(self, message: Mapping[str, Any]) -> None:
-        self._playing, self._single = False, 0
+        self._playing, self._steps_requested = False, 0
         self._stepping = self._drag = self._target = None
-        self._ask("run")
+        self._request("run")
 
     def _set_speed(self, message: Mapping[str, Any]) -> None:
-        self._speed = _positive(message.get("value"), "speed")
+        self._speed = finite_number(message.get("value"), "speed", 0.0, MAX_SPEED)
         if self._stepping is not None:
             self._stepping.begin_pace()
 
@@ -175,7 +182,7 @@ class LiveSession:
         if target.by_force != (self._stepping is not None):
             if target.by_force:
                 raise ModelError("a body is pulled by a force while the mechanism is stepped: start it first")
-            self._playing, self._single = False, 0
+            self._playing, self._steps_requested = False, 0
         self._target = target
 
     def _release(self, message: Mapping[str, Any]) -> None:
@@ -184,9 +191,9 @@ class LiveSession:
     def _picture_shown(self, message: Mapping[str, Any]) -> None:
         self._drawing = False
 
-    def _ask(self, what: str) -> None:
-        if what not in self._due:
-            self._due.append(what)
+    def _request(self, what: str) -> None:
+        if what not in self._pending_tasks:
+            self._pending_tasks.append(what)
 
     def refusal(self, error: FlyballError) -> bytes:
         """Return the answer to a message that was refused.
@@ -194,69 +201,71 @@ class LiveSession:
         Raises
         ------
         ClosedPage
-            If it was one of too many.
+            If it was one of too many invalid messages.
         """
-        self._refused += 1
-        if self._refused > MOST_REFUSED:
-            raise ClosedPage("too many messages that make no sense")
+        self._invalid_messages += isinstance(error, InvalidMessage)
+        if self._invalid_messages > MAX_INVALID_MESSAGES:
+            raise ClosedPage("too many invalid messages")
         return encode("error", {"text": self._wording(str(error))})
 
     # ---- work
 
     def wait(self) -> float | None:
         """Return how long to wait for a message until there is work [s]; None: until a message arrives."""
-        if self._due or self._single or (self._target is not None and not self._target.by_force):
+        if self._pending_tasks or (self._target is not None and not self._target.by_force):
             return 0.0
-        if self._playing and self._stepping is not None and not self._drawing:
-            return max(0.0, self._stepping.shown + PICTURE - time.monotonic())
-        return None if self._file is None else LOOK_AT_FILE
+        if self._stepping is not None and self._steps_requested:
+            return 0.0
+        if self._stepping is not None and self._playing and not self._drawing:
+            return max(0.0, self._stepping.shown + PICTURE_INTERVAL - time.monotonic())
+        return None if self._file is None else FILE_CHECK_INTERVAL
 
     def work(self, poll: Callable[[], None] = lambda: None) -> Iterator[bytes]:
-        """Do what is due, and yield messages to the page.
+        """Do the pending tasks, and yield messages to the page.
 
         Parameters
         ----------
         poll : callable
-            Called during a run; it takes waiting messages by `receive`. A newer value ends the run.
+            Called during a run; it takes waiting messages by `receive`. A run is abandoned when a newer value arrives.
         """
-        self._look_at_file()
-        while self._due:
-            what = self._due.pop(0)
-            yield from self._guarded({"model": self._describe, "run": self._run, "stepper": self._begin}[what], poll)
+        self._check_file()
+        while self._pending_tasks:
+            task = {"model": self._describe, "run": self._run, "stepper": self._begin}[self._pending_tasks.pop(0)]
+            yield from self._report_errors(task, poll)
         if self._target is not None and not self._target.by_force:
-            yield from self._guarded(self._assemble, poll)
-        elif self._stepping is not None and (self._single or (self._playing and not self._drawing)):
-            yield from self._guarded(self._advance, poll)
+            yield from self._report_errors(self._assemble, poll)
+        elif self._stepping is not None and (self._steps_requested or (self._playing and not self._drawing)):
+            yield from self._report_errors(self._advance, poll)
 
-    def _guarded(self, work: Callable[..., Iterator[bytes]], poll: Callable[[], None]) -> Iterator[bytes]:
+    def _report_errors(self, work: Callable[..., Iterator[bytes]], poll: Callable[[], None]) -> Iterator[bytes]:
         """Do work; an error goes to the page, in the words of the terminal."""
         try:
             yield from work(poll)
         except SupersededRun:
             pass
         except FlyballError as error:
-            self._playing, self._single, self._target = False, 0, None
+            self._playing, self._steps_requested, self._target = False, 0, None
             yield encode("error", {"text": self._wording(str(error))})
 
-    def _look_at_file(self) -> None:
+    def _check_file(self) -> None:
         now = time.monotonic()
-        if self._file is None or now - self._looked < LOOK_AT_FILE:
+        if self._file is None or now - self._checked < FILE_CHECK_INTERVAL:
             return
-        self._looked = now
+        self._checked = now
         changed = _time_of_change(self._file)
         if changed is not None and changed != self._changed:
             self._changed = changed
-            self._due = ["model", "run"]
+            self._pending_tasks = ["model", "run"]
 
     def _describe(self, poll: Callable[[], None]) -> Iterator[bytes]:
         """Load the model; sliders whose written value is the same keep their place."""
-        self._playing, self._single = False, 0
+        self._playing, self._steps_requested = False, 0
         self._stepping = self._drag = self._target = None
         try:
             model = self._load()
             new = make_sliders(model, self._options.ranges)
         except FlyballError:
-            self._due = []
+            self._pending_tasks = []
             raise
         before = self._model.parameters if self._model is not None else {}
         for name, slider in new.items():
@@ -270,6 +279,7 @@ class LiveSession:
                 "name": model.name,
                 "planar": model.planar,
                 "watched": self._file is not None,
+                "movable": [b.name for b in model.bodies],
                 "sliders": [dataclasses.asdict(x) for x in new.values()],
             },
         )
@@ -292,7 +302,7 @@ class LiveSession:
 
         def report(fraction: float) -> None:
             poll()
-            if "run" in self._due:
+            if "run" in self._pending_tasks:
                 raise SupersededRun
 
         try:
@@ -304,13 +314,14 @@ class LiveSession:
         seconds = time.perf_counter() - began - result.health.compiling
         self._result = result
         recording = record_motion(result)
+        self._playback_speed = recording.speed
         span = float(result.t[-1] - result.t[0])
         content = {"values": values, "seconds": seconds, "slow": slow_remark(seconds, span)}
         yield encode("run", content, recording)
         if error is not None:
             yield encode("error", {"text": self._wording(str(error))})
-        if self._playing:
-            self._ask("stepper")
+        if self._playing or self._steps_requested:
+            self._request("stepper")
 
     def _begin(self, poll: Callable[[], None]) -> Iterator[bytes]:
         """Make the stepper, unless there is one."""
@@ -318,8 +329,7 @@ class LiveSession:
             model = self._known_model()
             if self._result is None:
                 raise ModelError(f"{model.name!r} has no motion yet: nothing can be stepped")
-            speed = record_motion(self._result, curves=False).speed
-            self._stepping = LiveStepping(model, self.sliders, speed * PICTURE / 2.0)
+            self._stepping = LiveStepping(model, self.sliders, self._playback_speed * PICTURE_INTERVAL / 2.0)
             self._target = None
             yield self._motion([self._stepping.sample()], True)
         self._stepping.begin_pace()
@@ -330,9 +340,10 @@ class LiveSession:
         x = self._stepping
         assert x is not None
         try:
-            samples = x.advance(self.sliders, self._target, None if self._playing else self._single, self._speed)
+            count = None if self._playing else self._steps_requested
+            samples = x.advance(self.sliders, self._target, count, self._speed)
         finally:
-            self._single = 0
+            self._steps_requested = 0
         if samples:
             self._drawing = True
             yield self._motion(samples, False, x.slow_remark())
@@ -383,7 +394,7 @@ class LiveSession:
         )
 
 
-def converse(
+def exchange_messages(
     session: LiveSession, receive: Callable[[float | None], str | bytes], send: Callable[[bytes], None]
 ) -> None:
     """Pass messages between a page and its session until the page is closed.
@@ -403,10 +414,10 @@ def converse(
         In the end.
     """
 
-    def take(timeout: float | None) -> None:
-        """Take all messages that wait, after waiting for the first."""
+    def receive_waiting(timeout: float | None) -> None:
+        """Receive all messages that wait, after waiting for the first."""
         with suppress(TimeoutError):
-            for _ in range(MOST_AT_ONCE):
+            for _ in range(MAX_MESSAGES_AT_ONCE):
                 text = receive(timeout)
                 timeout = 0.0
                 try:
@@ -415,27 +426,14 @@ def converse(
                     send(session.refusal(error))
 
     while True:
-        take(session.wait())
-        for message in session.work(lambda: take(0.0)):
+        receive_waiting(session.wait())
+        for message in session.work(lambda: receive_waiting(0.0)):
             send(message)
 
 
 def slow_remark(seconds: float, span: float) -> str:
     """Say how slow a computation is; nothing if it is quick."""
-    if seconds < SLOW_RUN or span <= 0.0:
-        return ""
-    return f"slow: {seconds / span:.2g} s of computing for 1 s of motion"
-
-
-def _positive(value: Any, what: str) -> float:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not 0.0 < value < 1e9
-        or not math.isfinite(value)
-    ):
-        raise ModelError(f"{what} is {str(value)[:40]}; it must be a finite number greater than 0")
-    return float(value)
+    return "" if seconds < SLOW_RUN or span <= 0.0 else slow_text(seconds / span)
 
 
 def _time_of_change(file: Path | None) -> int | None:

@@ -1,15 +1,16 @@
-"""A mechanism that is stepped in the pace of a watch, and pulled by a spring from the mouse to a body."""
+"""A mechanism that is stepped at the pace of a clock, and pulled by a spring from the mouse to a body."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..errors import ModelError
 from ..forces.point_force import PointForce
 from ..forces.point_torque import PointTorque
@@ -17,38 +18,25 @@ from ..model.model import Model
 from ..model.units import to_si
 from ..results.result import Result
 from ..simulation.measurement import StateSample, model_with_inputs
+from .body_points import connected_mass, effective_mass, point_kinematics
 from .dragging import DragTarget
 from .options import Slider
 
-MOST_PULLED = 40
+MAX_PULLED_BODIES = 40
 """Bodies that can be pulled: each adds a force and a torque to every step."""
-MOST_SAMPLES = 12
-"""States of one picture that are kept for the curves."""
-BUDGET = 0.04
-"""Time for the steps of one picture [s]; what is not done by then is left out, and the page says so."""
-LONGEST_GAP = 1.0
+MAX_SAMPLES = 12
+"""States of one picture that are kept for the curves, besides the last."""
+COMPUTING_TIME_PER_PICTURE = 0.04
+"""Time for the steps of one picture [s]; steps that are due but not taken by then are omitted, and the page says so."""
+MAX_PICTURE_INTERVAL = 1.0
 """Time between two pictures [s] for which steps are made up: a page that was hidden for longer goes on from there."""
-SPRING_PHASE = 0.25
+SPRING_FREQUENCY = 0.25
 """Angular frequency of the mouse's spring, times a step: the force is constant in a step, which larger values feel."""
-SPRING_DAMPING = 0.7
-"""Damping ratio of the mouse's spring."""
-RIGID = 1e-6
-"""Motion of a pulled point, relative to that of the free total mass, below which it does not give way."""
-
-
-@dataclass(frozen=True)
-class _Grip:
-    """A pulled point: stiffness [N/m] and damping [N s/m] of the spring, and mass centre in the body's frame [m]."""
-
-    body: str
-    at: tuple[float, ...]
-    stiffness: float
-    damping: float
-    com: np.ndarray
+SPRING_DAMPING_RATIO = 0.7
 
 
 class LiveStepping:
-    """A stepper with a pull on every body, and with those parameters as inputs that only laws read.
+    """A stepper with a force and a torque on every body, and with those parameters as inputs that only laws read.
 
     Parameters
     ----------
@@ -65,15 +53,18 @@ class LiveStepping:
 
     def __init__(self, model: Model, sliders: Mapping[str, Slider], dt: float) -> None:
         self.dt, self._planar = dt, model.planar
-        self._pulled = [b.name for b in model.bodies][:MOST_PULLED]
-        out, pulls = _with_wrenches(model, self._pulled)
+        parameters: dict[str, Any] = {name: x.quantity for name, x in sliders.items()}
+        c = self._absolute = compile_mechanism(model.snapshot(), parameters=parameters, solved=False)
+        out, self._wrenches = _with_wrenches(
+            model, [b.name for b in model.bodies][:MAX_PULLED_BODIES], c.structure.points
+        )
+        self._count = sum(map(len, self._wrenches.values()))
         self._inputs = [name for name in sliders if _is_input(model, name)]
-        parameters = {name: x.quantity for name, x in sliders.items()}
-        self._stepper = out.stepper(dt, inputs=[*pulls, *self._inputs], parameters=parameters)
+        names = [name for own in self._wrenches.values() for name in own]
+        self._stepper = out.stepper(dt, inputs=[*names, *self._inputs], parameters=parameters)
         self.method = self._stepper.method
-        self._width = len(pulls) // max(len(self._pulled), 1)
-        self._grip: _Grip | None = None
-        self._slow = ""
+        self._gripped: tuple[str, tuple[float, ...]] | None = None
+        self._slow, self._seconds_per_step = "", math.inf
         self.begin_pace()
 
     def accepts(self, name: str) -> bool:
@@ -90,8 +81,12 @@ class LiveStepping:
         return self._stepper.sample()
 
     def motion(self, samples: list[StateSample]) -> Result:
-        """Return the motion through states."""
-        return self._stepper.motion(samples)
+        """Return the motion through states, with zero pulls: positions, velocities and energies do not depend on them.
+
+        Then states with the same values of parameters share their tables.
+        """
+        own = [dataclasses.replace(x, inputs=np.r_[np.zeros(self._count), x.inputs[self._count :]]) for x in samples]
+        return self._stepper.motion(own)
 
     def slow_remark(self) -> str:
         """Say how slow stepping is; nothing if it keeps pace."""
@@ -102,86 +97,85 @@ class LiveStepping:
     ) -> list[StateSample]:
         """Take a number of steps, or those that are due at this speed; return states to show."""
         began, t = time.monotonic(), float(self._stepper.t)
-        if began - self.shown > LONGEST_GAP:
+        if began - self.shown > MAX_PICTURE_INTERVAL:
             self.begin_pace()
         due = math.floor(((began - self._since) * speed - (t - self._from)) / self.dt) if count is None else count
         if due <= 0:
             self.shown = began
             return []
         values = np.array([to_si(str(sliders[k].quantity), None) for k in self._inputs])
-        grip = self._gripped(target, values) if target is not None else None
-        samples, done = [], 0
-        stride = max(1, due // MOST_SAMPLES)
-        while done < due:
-            n = min(stride, due - done) if grip is None else 1
-            self._stepper.step(np.r_[self._wrench(grip, target), values], steps=n)
-            done += n
-            if done % stride == 0 or done == due:
-                samples.append(self._stepper.sample())
-            if count is None and time.monotonic() - began > BUDGET:
-                break
+        end = math.inf if count is not None else began + COMPUTING_TIME_PER_PICTURE
+        samples, done = self._take_steps(due, values, target, end)
         self._slow = ""
         if done < due:
-            samples = samples or [self._stepper.sample()]
-            self._slow = f"slow: {(time.monotonic() - began) / (done * self.dt):.2g} s of computing for 1 s of motion"
+            self._slow = slow_text((time.monotonic() - began) / (done * self.dt), speed)
             self.begin_pace()
         self.shown = began
         return samples
 
-    def _gripped(self, target: DragTarget, values: np.ndarray) -> _Grip:
-        """Return the spring on the point of a target, made by how easily the point gives way."""
-        at = tuple(target.at.tolist())
-        if self._grip is not None and (self._grip.body, self._grip.at) == (target.body, at):
-            return self._grip
-        if target.body not in self._pulled:
-            raise ModelError(
-                f"body {target.body!r} cannot be pulled: only the first {MOST_PULLED} bodies of a mechanism can"
-            )
-        x = self.motion([self.sample()]).values
-        unit = _Grip(target.body, at, 0.0, 0.0, np.real(x.bodies[target.body].com))
-        mass = self._effective_mass(unit, values, float(x.system.bodies.mass.real.sum()))
-        rate = SPRING_PHASE / self.dt
-        self._grip = _Grip(target.body, at, mass * rate**2, 2.0 * SPRING_DAMPING * mass * rate, unit.com)
-        return self._grip
+    def _take_steps(
+        self, due: int, values: np.ndarray, target: DragTarget | None, end: float
+    ) -> tuple[list[StateSample], int]:
+        """Take steps until a time of the clock; return states to show, the last among them, and the number of steps."""
+        samples, done, stride = [], 0, max(1, due // MAX_SAMPLES)
+        while done < due:
+            now = time.monotonic()
+            if done and now >= end:
+                break
+            affordable = 1 if end - now < self._seconds_per_step else (end - now) / self._seconds_per_step
+            n = 1 if target is not None else int(min(stride - done % stride, due - done, affordable))
+            self._stepper.step(np.r_[self._pull(target), values], steps=n)
+            self._seconds_per_step = (time.monotonic() - now) / n
+            done += n
+            if done % stride == 0:
+                samples.append(self.sample())
+        if done % stride:
+            samples.append(self.sample())
+        return samples, done
 
-    def _effective_mass(self, grip: _Grip, values: np.ndarray, total: float) -> float:
-        """Return the least mass that the point shows to a force along an axis, joints and contacts included [kg].
+    def _pull(self, target: DragTarget | None) -> np.ndarray:
+        """Return the forces and torques on all bodies [N, N m], from the spring between a point and its target.
 
-        It is measured by trial steps with small forces; the state is restored.
+        Its stiffness and damping follow from the effective mass of the point at the present position. Where that grows
+        beyond all bounds, as at a dead centre, the mass of the connected bodies limits it, and with it the force.
         """
-        saved, axes = self._stepper.state, 2 if self._planar else 3
-        trial = total / self.dt  # changes the velocity of the free total mass by 1 m/s
-        velocities = []
-        for force in (np.zeros(3), *(1e-3 * trial * np.eye(3)[:axes])):
-            self._stepper.step(np.r_[self._applied(grip, force), values])
-            velocities.append(self._kinematics(grip)[1])
-            self._stepper.state = saved
-        given = max(float((v - velocities[0])[k]) for k, v in enumerate(velocities[1:])) / 1e-3
-        if not given > RIGID:
-            raise ModelError(f"body {grip.body!r} does not give way at this point: joints or drivers hold it")
-        return total / given
+        if target is None:
+            self._gripped = None
+            return np.zeros(self._count)
+        if target.body not in self._wrenches:
+            raise ModelError(
+                f"body {target.body!r} cannot be pulled: only the first {MAX_PULLED_BODIES} bodies of a mechanism can"
+            )
+        c, v = self._absolute_state()
+        mass, grip = effective_mass(c, target.body, target.at), (target.body, tuple(target.at.tolist()))
+        if mass == math.inf and grip != self._gripped:
+            raise ModelError(
+                f"body {target.body!r} cannot be pulled at this point: its joints and drivers leave it no motion"
+            )
+        self._gripped = grip
+        mass, rate = min(mass, connected_mass(c, target.body)), SPRING_FREQUENCY / self.dt
+        position, arm, J = point_kinematics(c, target.body, target.at)
+        force = mass * rate * (rate * (target.to - position) - 2.0 * SPRING_DAMPING_RATIO * (J @ v))
+        moment = np.cross(arm, force)
+        wrench = [force[0], force[1], moment[2]] if self._planar else [*force, *moment]
+        return np.concatenate(
+            [wrench[: len(own)] if body == target.body else np.zeros(len(own)) for body, own in self._wrenches.items()]
+        )
 
-    def _kinematics(self, grip: _Grip) -> tuple[np.ndarray, np.ndarray]:
-        """Return position and velocity of the gripped point, in the world."""
-        (p, R), (v, w) = self._stepper.pose(grip.body), self._stepper.velocity(grip.body)
-        arm = R @ np.array(grip.at)
-        return p + arm, v + np.cross(w, arm)
+    def _absolute_state(self) -> tuple[CompiledMechanism, np.ndarray]:
+        """Return the mechanism in absolute coordinates, evaluated at the present position, and the velocities."""
+        now = self.motion([self.sample()])
+        other, c, t = CompiledMechanism(now.values, now.states[0].copy()), self._absolute, float(now.t[0])
+        q, v = c.take(other, t, now.q[0], now.v[0])
+        c.at(t, q, np.zeros(c.structure.nv))
+        return c, v
 
-    def _wrench(self, grip: _Grip | None, target: DragTarget | None) -> np.ndarray:
-        """Return the inputs of all pulls."""
-        if grip is None or target is None:
-            return np.zeros(self._width * len(self._pulled))
-        p, v = self._kinematics(grip)
-        return self._applied(grip, grip.stiffness * (target.to - p) - grip.damping * v)
 
-    def _applied(self, grip: _Grip, force: np.ndarray) -> np.ndarray:
-        """Return the inputs of all pulls for a force at the gripped point."""
-        out = np.zeros((len(self._pulled), self._width))
-        _, R = self._stepper.pose(grip.body)
-        moment = np.cross(R @ (np.array(grip.at) - grip.com), force)
-        row = [force[0], force[1], moment[2]] if self._planar else [*force, *moment]
-        out[self._pulled.index(grip.body)] = row[: self._width]
-        return out.ravel()
+def slow_text(seconds: float, speed: float = 0.0) -> str:
+    """Say how many seconds of computing a second of motion needs, and that a speed is higher than it allows."""
+    text = f"slow: {seconds:.2g} s of computing for 1 s of motion"
+    possible = 1.0 / seconds
+    return f"{text}, which allows {possible:.2g} of real time and not {speed:g}" if speed > possible else text
 
 
 def _is_input(model: Model, name: str) -> bool:
@@ -193,29 +187,32 @@ def _is_input(model: Model, name: str) -> bool:
     return True
 
 
-def _with_wrenches(model: Model, bodies: list[str]) -> tuple[Any, list[str]]:
+def _with_wrenches(model: Model, bodies: list[str], points: Collection[str]) -> tuple[Any, dict[str, list[str]]]:
     """Return a copy with a force at the mass centre of each body and a torque, zero for now, world axes.
 
     Parameters
     ----------
     model : Model
     bodies : list of str
+    points : collection of str
+        Point masses, which have no orientation and get no torque.
 
     Returns
     -------
     model : Model
-    names : list of str
-        Of the components as inputs: for each body x, y and the torque in the plane, x, y, z of both in space.
+    names : dict
+        Body -> its inputs: components x, y of the force and the torque in the plane, x, y, z of both in space.
     """
-    out, names = model.copy(), []
+    out, names = model.copy(), {}
     for body in bodies:
         force, torque = (_unused_name(out, f"{what} on {body}") for what in ("force", "torque"))
-        if model.planar:
-            out.add(PointForce(force, body, force=(0, 0)), PointTorque(torque, body, torque=0))
-            names += [f"{force}.x", f"{force}.y", torque]
-        else:
-            out.add(PointForce(force, body, force=(0, 0, 0)), PointTorque(torque, body, torque=(0, 0, 0)))
-            names += [f"{name}.{axis}" for name in (force, torque) for axis in "xyz"]
+        zero, axes = ((0, 0), "xy") if model.planar else ((0, 0, 0), "xyz")
+        out.add(PointForce(force, body, force=zero))
+        names[body] = [f"{force}.{axis}" for axis in axes]
+        if body in points:
+            continue
+        out.add(PointTorque(torque, body, torque=0 if model.planar else zero))
+        names[body] += [torque] if model.planar else [f"{torque}.{axis}" for axis in axes]
     return out, names
 
 

@@ -12,11 +12,11 @@ from ..errors import ModelError
 from ..model.model import Model
 from ..view.page import live_page
 from .options import LiveOptions, make_sliders
-from .session import ClosedPage, LiveSession, converse
+from .session import ClosedPage, LiveSession, exchange_messages
 
 OPEN, CLOSE = '{"do":"open"}', '{"do":"close"}'
-MOST_WAITING = 1000
-"""Messages of the page that wait; newer ones are dropped, since the page sends its newest value again."""
+MAX_WAITING = 1000
+"""Messages of the page that wait; the oldest are dropped."""
 FRAME_SCRIPT = """
 function render({ model, el }) {
   const frame = document.createElement("iframe");
@@ -44,8 +44,8 @@ export default { render };
 """
 
 
-class Conversation:
-    """Sessions in threads of their own, one for each page that the widget has opened; the last one goes on.
+class WidgetSessions:
+    """Sessions in threads of their own, one for each page that the widget has opened; opening one ends the last.
 
     Parameters
     ----------
@@ -60,16 +60,19 @@ class Conversation:
         self._waiting: queue.Queue[str | None] = queue.Queue()
 
     def receive(self, text: Any) -> None:
-        """Take a message of the page: one begins a session, one ends it, the others are for the session."""
+        """Receive a message of the page: one begins a session, one ends it, the others are for the session."""
         if text in (OPEN, CLOSE):
             self._waiting.put(None)
             self._waiting = queue.Queue()
             if text == OPEN:
-                threading.Thread(target=self._converse, args=(self._waiting,), daemon=True).start()
-        elif isinstance(text, str) and self._waiting.qsize() < MOST_WAITING:
+                threading.Thread(target=self._serve, args=(self._waiting,), daemon=True).start()
+        elif isinstance(text, str):
+            if self._waiting.qsize() >= MAX_WAITING:
+                with suppress(queue.Empty):  # the session may have taken them meanwhile
+                    self._waiting.get_nowait()
             self._waiting.put(text)
 
-    def _converse(self, waiting: queue.Queue[str | None]) -> None:
+    def _serve(self, waiting: queue.Queue[str | None]) -> None:
         def receive(timeout: float | None) -> str:
             try:
                 text = waiting.get(timeout is None or timeout > 0.0, timeout)
@@ -80,7 +83,7 @@ class Conversation:
             return text
 
         with suppress(ClosedPage):
-            converse(LiveSession(lambda: self._model, self._options), receive, self._send)
+            exchange_messages(LiveSession(lambda: self._model, self._options), receive, self._send)
 
 
 def live_widget(model: Model, o: LiveOptions, height: int = 720) -> Any:
@@ -107,6 +110,6 @@ def live_widget(model: Model, o: LiveOptions, height: int = 720) -> Any:
         height = traitlets.Int().tag(sync=True)
 
     widget = LiveWidget(page=live_page(model.name), title=f"{model.name}, live", height=height)
-    conversation = Conversation(model, o, lambda message: widget.send({}, [message]))
-    widget.on_msg(lambda _, content, buffers: conversation.receive(content))
+    sessions = WidgetSessions(model, o, lambda message: widget.send({}, [message]))
+    widget.on_msg(lambda _, content, buffers: sessions.receive(content))
     return widget

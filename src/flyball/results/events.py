@@ -147,6 +147,7 @@ def split_by_parameters(result: Any) -> tuple[Any, ...]:
         piece.phases, piece.wound = stretches, result.wound
         piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
         piece.begun, piece.within = result.begun, (result, at)
+        piece.bulk = {name: own.at_times(at) for name, own in result.bulk.items()}
         if result.contacts is not None:
             piece.contacts = result.contacts.at_times(range(at.start, at.stop))
         out.append(piece)

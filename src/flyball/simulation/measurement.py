@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..assembly.assembled_state import initial_conditions
+from ..assembly.assembled_state import Assembly, initial_conditions
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..engine.entry_point import POSITION
 from ..errors import ModelError
+from ..mobility.mobility import mobility
 from ..model.body import GROUND, Driver, Frame
 from ..model.controller import Sensor
 from ..model.element_laws import with_inputs
@@ -20,12 +23,14 @@ from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..numerics.integrators.butcher_tableaux import tableau
 from ..numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
+from ..results.events import Phase, Phases
 from ..results.health import Health
+from ..results.mobility import Mobility
 from ..results.part_views.bodies import BodySetMotion, join_in_time
 from ..results.result import Result
 from ..tables.element_numbers import element_numbers
 from ..tables.law_inputs import element_laws
-from ..tables.values import Values
+from ..tables.values import Values, values
 
 CHANGED_INPUT = 1.5  # factor of an input's value, to find out which numbers depend on it
 
@@ -102,10 +107,14 @@ class CountedAngles(NamedTuple):
 
 @dataclass(frozen=True)
 class StateSample:
-    """Time [s] and state of one copy of a stepper at an instant; of sets of bodies their motions, at one time."""
+    """Time [s], state and inputs of one copy of a stepper at an instant; of sets of bodies their motions at that time.
+
+    Inputs are those of the step that ended in the state.
+    """
 
     t: float
     state: np.ndarray
+    inputs: np.ndarray
     sets: Mapping[str, BodySetMotion]
 
 
@@ -120,6 +129,8 @@ class Measurement:
     tree : sequence of str
         Tree joints of the motion's coordinates; empty for absolute coordinates.
     parameters : mapping, optional
+    inputs : sequence of str
+        Parameters that are inputs.
 
     Attributes
     ----------
@@ -140,8 +151,9 @@ class Measurement:
         outputs: Sequence[str],
         tree: Sequence[str],
         parameters: Mapping[str, float] | None,
+        inputs: Sequence[str] = (),
     ) -> None:
-        self._described = model
+        self._described, self._inputs = model, tuple(inputs)
         model, names = _with_sensors(model, outputs)
         c = self._compiled = compile_mechanism(model, parameters=parameters, tree=tree, outputs=names, solved=False)
         s = self.structure = c.structure
@@ -220,16 +232,37 @@ class Measurement:
         """Return to a saved time and state."""
         self._time.t, self.state[:] = saved
 
-    def sample(self, t: float, sets: Mapping[str, BodySetMotion]) -> StateSample:
-        """Return time and state as last written."""
-        return StateSample(t, self.state.copy(), sets)
+    def sample(self, t: float, inputs: np.ndarray, sets: Mapping[str, BodySetMotion]) -> StateSample:
+        """Return time, inputs and the state as last written."""
+        return StateSample(t, self.state.copy(), inputs.copy(), sets)
 
     def motion(self, samples: Sequence[StateSample]) -> Result:
-        """Return the motion through states; accelerations and multipliers are nan."""
+        """Return the motion through states, each with its own inputs; accelerations and multipliers are nan.
+
+        Raises
+        ------
+        ModelError
+            If there are no samples.
+        """
+        if not len(samples):
+            raise ModelError("a motion is made of the samples of a stepper, got none; collect sim.sample() after steps")
         t, rows = np.array([x.t for x in samples]), np.array([x.state for x in samples])
-        result = motion_through_states(self._compiled.values, t, rows)
+        phases = self._phases(samples)
+        result = motion_through_states(phases[-1].values, t, rows)
+        if len(phases) > 1:
+            result.phases = Phases(phases)
         result.bulk = {name: join_in_time([x.sets[name] for x in samples]) for name in samples[0].sets}
         return result
+
+    def _phases(self, samples: Sequence[StateSample]) -> tuple[Phase, ...]:
+        """Return phases of equal inputs, with the tables of laws that read them."""
+        s, given, out = self.structure, self._compiled.parameters, []
+        for inputs, group in groupby(samples, key=lambda x: tuple(x.inputs.tolist())):
+            own = list(group)
+            tables = values(s, {**given, **dict(zip(self._inputs, inputs, strict=True))})
+            modes, directions = np.zeros((5, len(s.switches))), np.zeros(len(s.switches))
+            out.append(Phase(len(own), modes, directions, tables, 0.0, 0.0, own[-1].state))
+        return tuple(out)
 
     def outputs(self, out: np.ndarray) -> None:
         """Write the outputs at the state last evaluated."""
@@ -284,7 +317,16 @@ def motion_through_states(values: Values, t: np.ndarray, rows: np.ndarray) -> Re
     multipliers = np.full((n, len(values.system.rows.law) + len(s.prescribed)), np.nan)
     health = Health(True, "states of a motion", np.nan, np.nan, steps=n, rejected=0, evaluations=0, factorisations=0,
                     seconds=0.0)  # fmt: skip
-    return Result(s.model, values, t, q, v, z, vdot, multipliers, health)
+    health.late = {"mobility": partial(_mobility, CompiledMechanism(values, z[0].copy()), float(t[0]), q[0], v[0])}
+    result = Result(s.model, values, t, q, v, z, vdot, multipliers, health)
+    result.final = float(t[-1]), rows[-1].copy()
+    return result
+
+
+def _mobility(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> Mobility:
+    model = c.structure.model
+    base = compile_mechanism(model, parameters=c.values.parameter_values)
+    return mobility(model, Assembly(base, t, *base.take(c, t, q, v)))
 
 
 def _with_sensors(model: Model, outputs: Sequence[str]) -> tuple[Model, list[str]]:

@@ -421,7 +421,7 @@ class Stepper:
         else:
             start = find_initial_state(model, o.t_start, parameters, None, o.coordinates)
             motion = IntegratedMotion(start, o.integration(), self.dt, self._parameters)
-        x = Measurement(model, self.output_names, motion.tree, parameters)
+        x = Measurement(model, self.output_names, motion.tree, parameters, self._parameters)
         motion.measure_by(x)
         return _Copy(motion, x)
 
@@ -558,8 +558,8 @@ class Stepper:
         AssemblyError
             If there is no position with these values.
         """
-        if copy is not None and not (isinstance(copy, int) and 0 <= copy < len(self._copies)):
-            raise ModelError(f"copy is a number from 0 to {len(self._copies) - 1}, got {copy!r}")
+        if copy is not None:
+            self._require_copy(copy)
         for k in range(len(self._copies)) if copy is None else (copy,):
             if values:
                 self._copies[k] = self._begin(*self._model_at(values))
@@ -569,6 +569,11 @@ class Stepper:
             self._inputs[k] = self._usual
             self._measure(k)
         return self.outputs()
+
+    def _require_copy(self, copy: int) -> None:
+        last = len(self._copies) - 1
+        if isinstance(copy, bool) or not isinstance(copy, int) or not 0 <= copy <= last:
+            raise ModelError(f"copy is a number from 0 to {last}, got {copy!r}")
 
     def _model_at(self, values: Mapping[str, float | Sequence[float]]) -> tuple[Model, dict[str, float]]:
         """Return the model with initial values that are parameters, and the values of these."""
@@ -616,15 +621,22 @@ class Stepper:
         self._inputs[:] = saved.inputs
 
     def sample(self, copy: int = 0) -> StateSample:
-        """Return time and state of a copy, from which `motion` makes a result."""
+        """Return time, state and inputs of a copy, from which `motion` makes a result."""
+        self._require_copy(copy)
         x = self._copies[copy]
-        return x.measurement.sample(self._time(x), x.motion.sets())
+        return x.measurement.sample(self._time(x), self._inputs[copy], x.motion.sets())
 
     def motion(self, samples: Sequence[StateSample]) -> Result:
         """Return the motion through samples of this stepper, in the order of time, as a result.
 
-        It has positions, velocities, energies of the bodies and what laws measure. Accelerations and reactions are nan:
-        steps do not keep them.
+        It has positions, velocities, energies of the bodies, what laws measure, and forces of laws. Laws are evaluated
+        with the inputs of the step that ended in the sample; at the start with the values of parameters, and zero for
+        forces and motors. Accelerations and reactions are nan: steps do not keep them.
+
+        Raises
+        ------
+        ModelError
+            If there are no samples.
         """
         return self._copies[0].measurement.motion(samples)
 

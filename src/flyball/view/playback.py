@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 EASY_FREQUENCY = 2.0
 """Turns or oscillations in a second of playing [Hz] that the eye follows easily."""
-SHORTEST, LONGEST = 2.0, 20.0
-"""Durations [s] that a motion should take to play; a longer one is quickened as far as its motion stays easy to see."""
+MIN_PLAYING_TIME, MAX_PLAYING_TIME = 2.0, 20.0
+"""Durations [s] that a motion should take to play; a longer one is sped up as far as its motion stays easy to see."""
 ROUND_FACTORS = (1.0, 2.0, 5.0, 10.0)
 TURN_BETWEEN_OUTPUTS = 1.0 / 8.0
 """Largest turn of a body between two output times at which the turning can still be seen."""
-MOST_SHOWN = 2001
+MAX_OUTPUTS_SHOWN = 2001
 """Output times of which a page shows all."""
 REVERSAL = 0.05
 """Velocity, relative to the largest of its component, that counts for a reversal: smaller ones are noise."""
@@ -59,10 +59,10 @@ def suitable_speed(duration: float, frequency: float) -> float:
     """Return the speed for a motion of this duration [s] whose fastest turning or oscillation has this frequency [Hz].
 
     It is at most the speed at which the fastest is easy to see, and at which the motion takes 2 s. It is real time if
-    that is not too fast; a motion longer than 20 s is quickened to about this duration.
+    that is not too fast; a motion longer than 20 s is sped up to about this duration.
     """
-    most = min(EASY_FREQUENCY / frequency if frequency > 0.0 else math.inf, duration / SHORTEST)
-    return _round_down(min(most, max(1.0, duration / LONGEST)))
+    largest = min(EASY_FREQUENCY / frequency if frequency > 0.0 else math.inf, duration / MIN_PLAYING_TIME)
+    return _round_down(min(largest, max(1.0, duration / MAX_PLAYING_TIME)))
 
 
 def _round_down(speed: float) -> float:
@@ -102,10 +102,10 @@ def _remark(t: np.ndarray, rates: dict[str, np.ndarray]) -> str:
         return ""
     needed = _rounded_up(math.ceil((len(t) - 1) * turns[name] / TURN_BETWEEN_OUTPUTS - 1e-6) + 1)
     too_far = f"{name} turns by {turns[name]:.2g} of a turn between two output times: too far apart to show its motion"
-    if needed <= MOST_SHOWN:
+    if needed <= MAX_OUTPUTS_SHOWN:
         return f"{too_far}; outputs={needed} would show it"
-    span = (t[-1] - t[0]) * MOST_SHOWN / needed
-    return f"{too_far}; {MOST_SHOWN} outputs of a motion of at most {span:.2g} s would show it"
+    span = (t[-1] - t[0]) * MAX_OUTPUTS_SHOWN / needed
+    return f"{too_far}; {MAX_OUTPUTS_SHOWN} outputs of a motion of at most {span:.2g} s would show it"
 
 
 def _rounded_up(count: int) -> int:

@@ -320,6 +320,10 @@ class BodySetMotion:
         """Return the energy of gravity [J], zero if every mass centre is at the world's origin, (n,)."""
         return -np.einsum("tmi,i,m->t", self.position, np.asarray(gravity, float), self.mass)
 
+    def at_times(self, rows: slice) -> BodySetMotion:
+        """Return the motion at some of its times."""
+        return replace(self, **{k: getattr(self, k)[rows] for k in SET_MOTION_ARRAYS})  # type: ignore[arg-type]
+
     def as_dict(self) -> dict[str, Any]:
         """Plain lists."""
         return {k: getattr(self, k).tolist() for k in (*SET_MOTION_ARRAYS, *SET_MEMBER_ARRAYS)}

@@ -13,10 +13,10 @@ function svgElement(tag, parent, attributes = {}) {
 export class Grip {
   /**
    * Dragging in a picture; `onDrag({ body, at, to })` is called while a body is pulled, with the point in its axes and
-   * the place in the world, and `onRelease()` at the end.
+   * the place in the world, and `onRelease()` at the end. Only bodies for which `isMovable(name)` holds can be taken.
    */
-  constructor(picture, onDrag, onRelease) {
-    Object.assign(this, { picture, onDrag, onRelease, held: null });
+  constructor(picture, onDrag, onRelease, isMovable) {
+    Object.assign(this, { picture, onDrag, onRelease, isMovable, held: null });
     const { stage } = picture;
     const svg = svgElement("svg", stage.element, { class: "pull", "aria-hidden": "true" });
     this.line = svgElement("line", svg);
@@ -41,7 +41,7 @@ export class Grip {
     const pixel = this.#pixel(event);
     const part = stage.pick(...pixel);
     const body = part?.category === "joint" ? this.#moving(part) : part;
-    if (body?.category !== "body" || !mechanism.byName.has(body.name)) return;
+    if (body?.category !== "body" || !mechanism.byName.has(body.name) || !this.isMovable(body.name)) return;
     const point = stage.pointAt(...pixel, body.group.position);
     const at = point.clone().sub(body.group.position).applyQuaternion(body.group.quaternion.clone().invert());
     this.held = { body: body.name, at, depth: point, to: point, moved: false, pixel };

@@ -6,7 +6,7 @@ import { Player } from "./main.js";
 import { connect } from "./transport.js";
 import { Variants } from "./variants.js";
 
-const PATIENCE = 250; // ms after which a new position of the mouse is sent though the last was not answered
+const ANSWER_TIMEOUT = 250; // ms after which a new value is sent though the last was not answered
 const DIGITS = 6;
 const find = (selector) => document.querySelector(`.live ${selector}`);
 
@@ -47,9 +47,9 @@ class Parameter {
 
 class Live {
   constructor() {
-    Object.assign(this, { player: null, parameters: [], stepping: false, values: {}, waiting: 0, latest: null, runs: 0, pictures: 0 });
+    Object.assign(this, { player: null, parameters: [], stepping: false, values: {}, sent: -Infinity, latest: null, timer: null, runs: 0, pictures: 0 });
     this.send = connect(
-      (message) => this.#take(message),
+      (message) => this.#receive(message),
       (text) => this.#end(text),
     );
     find("[name=run-live]").addEventListener("click", () => this.step(!this.stepping));
@@ -61,9 +61,9 @@ class Live {
 
   // ---- messages of the session
 
-  #take(message) {
+  #receive(message) {
     const recording = message.recording && readRecording(message.recording);
-    const takers = {
+    const handlers = {
       model: () => this.#describe(message),
       busy: () => this.#say(message.text),
       run: () => this.#run(message, recording),
@@ -71,17 +71,18 @@ class Live {
       stepping: () => this.#say(this.stepping ? "stepping" : "stepped"),
       error: () => this.#fault(message.text),
     };
-    takers[message.kind]();
+    handlers[message.kind]();
     requestAnimationFrame(() => {
       if (message.kind === "motion") this.send({ do: "shown" });
-      this.waiting = 0;
+      this.sent = -Infinity;
       this.#sendLatest();
     });
   }
 
-  #describe({ name, planar, sliders }) {
+  #describe({ name, planar, sliders, movable }) {
     if (this.player && this.player.recording.planar !== planar) return location.reload();
     document.querySelector(".player h1").textContent = document.title = name;
+    this.movable = new Set(movable);
     this.parameters = sliders.map((slider) => new Parameter(slider, (what, value) => this.set(what, value)));
     find(".parameters").replaceChildren(...this.parameters.map(({ row }) => row));
     const chosen = sliders.some((slider) => slider.chosen);
@@ -110,6 +111,7 @@ class Live {
       this.player.picture,
       (pull) => this.#pull(pull),
       () => this.#release(),
+      (body) => this.movable.has(body),
     );
     this.send({ do: "speed", value: this.player.clock.speed });
     this.player.clock.onPlay = () => this.stepping && this.step(false);
@@ -122,7 +124,7 @@ class Live {
     this.closure = closure ?? null;
     this.#slow(slow);
     if (closure === undefined) this.#say(`${this.stepping ? "stepping" : "stepped"}, ${shortNumber(chunk.t.at(-1))} s`);
-    else this.#say("dragged: joints closed, drivers let go");
+    else this.#say("dragged: joints closed, drivers switched off");
     if (closure !== undefined) this.#fault("");
     this.grip.draw();
     if (this.stepping) this.grip.pull();
@@ -175,12 +177,13 @@ class Live {
     this.send({ do: "reset" });
   }
 
-  /** Keep the motion on the page in a colour, under the values that it belongs to. */
+  /** Keep the motion on the page in a colour, labelled by its parameters: the present ones once it was stepped. */
   keep() {
     if (!this.player) return;
-    const label = this.parameters.map(({ name, row }) => {
+    const label = this.parameters.map(({ name, value, row }) => {
       const unit = row.querySelector(".unit").textContent;
-      return `${name} ${Number((this.values[name] ?? 0).toPrecision(4))}${unit && ` ${unit}`}`;
+      const own = this.pictures ? value : (this.values[name] ?? value);
+      return `${name} ${Number(own.toPrecision(4))}${unit && ` ${unit}`}`;
     });
     this.variants.keep(label.join(", ") || `motion ${this.runs}`);
   }
@@ -202,17 +205,21 @@ class Live {
     this.send({ do: "release" });
   }
 
-  /** Send the newest of each kind, one at a time: what comes faster than answers is left out. */
+  /** Send the newest of each kind after the answer to the last, or after a while without one. */
   #queue(kind, message) {
     (this.latest ??= new Map()).set(kind, message);
-    if (performance.now() - this.waiting > PATIENCE) this.#sendLatest();
+    const rest = this.sent + ANSWER_TIMEOUT - performance.now();
+    if (!(rest > 0)) this.#sendLatest();
+    else this.timer ??= setTimeout(() => this.#sendLatest(), rest);
   }
 
   #sendLatest() {
+    clearTimeout(this.timer);
+    this.timer = null;
     if (!this.latest?.size) return;
     for (const message of this.latest.values()) this.send(message);
     this.latest.clear();
-    this.waiting = performance.now();
+    this.sent = performance.now();
   }
 }
 

@@ -21,15 +21,14 @@ function copied(recording, colour) {
 
 /** Let everything of a mechanism show as a shadow behind the present one. */
 function fade(mechanism, colour) {
-  for (const root of [mechanism.root])
-    root.traverse((object) => {
-      object.renderOrder -= BELOW;
-      object.castShadow = object.receiveShadow = false;
-      if (object.material) {
-        Object.assign(object.material, { transparent: true, opacity: OPACITY, depthWrite: false });
-        object.material.color?.set(colour);
-      }
-    });
+  mechanism.root.traverse((object) => {
+    object.renderOrder -= BELOW;
+    object.castShadow = object.receiveShadow = false;
+    if (object.material) {
+      Object.assign(object.material, { transparent: true, opacity: OPACITY, depthWrite: false });
+      object.material.color?.set(colour);
+    }
+  });
 }
 
 export class Variants {
