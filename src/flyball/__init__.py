@@ -70,7 +70,7 @@ Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
-    run.compare("test.csv")       -> MeasurementComparison with measured curves: RMS, largest deviation, R^2
+    run.compare("test.csv")       -> MeasurementComparison with measured curves: deviations
     run.differences(other)        -> Differences of two motions: parameters, parts, curves, events, health
     run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables

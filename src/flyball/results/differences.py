@@ -16,6 +16,7 @@ from .wording import number_text
 if TYPE_CHECKING:
     from .result import Result
 
+LISTED_CURVES = 12  # from more curves the main ones are listed
 LONGEST_VALUE = 40  # letters of a field's value in a text
 TIMINGS = ("time used", "engine", "events")  # lines of health that are not compared: chance, or told as events
 
@@ -92,7 +93,9 @@ class Differences:
         out += [("parameter", f"{k}: {value_text(a)} -> {value_text(b)}") for k, (a, b) in self.parameters.items()]
         out += [("part", f"{name}: {text}") for name, text in self.parts.items()]
         main = self.first.main_curves()
-        told = [c for c in self.curves if c.name in main] or list(self.curves[: len(main)])
+        told = list(self.curves)
+        if len(told) > LISTED_CURVES:
+            told = [c for c in told if c.name in main] or told[:LISTED_CURVES]
         for c in told:
             unit = "" if c.unit in ("", "1") else f" {c.unit.replace('*', ' ')}"
             largest, at, final = c.texts()

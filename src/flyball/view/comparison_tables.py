@@ -67,7 +67,7 @@ def _curve_table(found: Mapping[str, Differences]) -> ComparisonTable:
     how = "; interpolated between output times, which differ" if interpolated else ""
     note = f"Differences from the first motion, of the plotted curves{how}."
     return ComparisonTable(
-        "Curves", ("curve", MOTION, "largest", "at [s]", "at the end"), tuple(rows), note, tuple(curves)
+        "Curves", ("curve", MOTION, "largest", "at [s]", "final"), tuple(rows), note, tuple(curves)
     )
 
 

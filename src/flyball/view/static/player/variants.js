@@ -5,6 +5,7 @@ import { element } from "./format.js";
 const COLOURS = ["#d14d62", "#2aa187", "#8a6fd0", "#c9a11f", "#4fb0d8", "#b0673f"];
 const BELOW = 1e6; // in the painter's order of the plane
 const OPACITY = 0.28;
+const BACK = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 }; // behind what lies in the same place
 
 /** A copy of a recording's motion that later changes of the recording do not reach, in one colour. */
 function copied(recording, colour) {
@@ -25,10 +26,11 @@ function fade(mechanism, colour) {
     object.renderOrder -= BELOW;
     object.castShadow = object.receiveShadow = false;
     if (object.material) {
-      Object.assign(object.material, { transparent: true, opacity: OPACITY, depthWrite: false });
+      Object.assign(object.material, { transparent: true, opacity: OPACITY, depthWrite: false, ...BACK });
       object.material.color?.set(colour);
     }
   });
+  for (const { shade } of mechanism.bodies) shade?.traverse(({ material }) => material && (material.visible = false));
 }
 
 export class Variants {
