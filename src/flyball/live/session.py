@@ -11,7 +11,7 @@ message from the page is a JSON object whose ``do`` says what to do:
 ``drag``                  pull the point ``at`` of ``body`` [m, in its frame] to the point ``to`` [m, world], ``by``
                           ``assembly`` (the mechanism follows, closed) or ``force`` (a spring, while stepping); ``t``
                           is the time shown
-``release``               let go
+``release``               release the body
 ``shown``                 the last picture of stepping is drawn: the next one may come
 ========================= =============================================================================
 
