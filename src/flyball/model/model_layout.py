@@ -110,7 +110,7 @@ def _statements(text: str) -> list[Statement]:
             depth += sum((x in OPENING) - (x in CLOSING) for x in tokens)
             tokens, comment, column = [], "", 0
             if depth == 0:
-                if found and _goes_on(found[-1][-1], made[0]):
+                if found and _continues_comment(found[-1][-1], made[0]):
                     found[-1] += made
                 else:
                     found.append(made)
@@ -118,7 +118,7 @@ def _statements(text: str) -> list[Statement]:
     return found
 
 
-def _goes_on(last: _Line, line: _Line) -> bool:
+def _continues_comment(last: _Line, line: _Line) -> bool:
     """Return whether a line continues the comment of the line before."""
     return bool(last.comment and line.comment and not line.code and line.column == last.column > 0)
 

@@ -1,6 +1,6 @@
 """The format of model files as a JSON schema (draft 2020-12), by which editors complete, explain and check them.
 
-The schema is made from the elements: types and defaults of their fields, and the entries of their docstrings. It has
+The schema is schema from the elements: types and defaults of their fields, and the entries of their docstrings. It has
 what can be known of one field alone. What depends on several fields, on units or on other elements (a name that does
 not exist) is found when the file is loaded.
 """
@@ -18,7 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from ..docstrings import ArgumentHelp, argument_help, first_doc_line
 from ..errors import ModelError
-from .element import Element, Flag, Number, Unit, Velocity, fields_with
+from .element import Element, Flag, Number, Numbers, Unit, fields_with
 from .event import Action
 from .model import Model
 from .model_files import DEFAULT_KINDS, MANY_KINDS, ONE_KIND, SENSORS, element_types
@@ -27,7 +27,7 @@ from .shapes.solid import Solid
 from .snapshot import CATEGORIES
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-SETTINGS = {"name": str, "planar": Flag, "gravity": Velocity, "parameters": dict[str, Number]}
+SETTINGS = {"name": str, "planar": Flag, "gravity": Numbers, "parameters": dict[str, Number]}
 """Types of the keys before the first table."""
 _SENTENCE_END = re.compile(r"(?<=[.;])\s+(?=[A-Z])")
 
@@ -41,10 +41,10 @@ class _FieldSchema(GenerateJsonSchema):
 
     def union_schema(self, schema: Any) -> Any:
         """Return ``{"type": ["number", "string"]}`` in place of a list of such schemas."""
-        made = super().union_schema(schema)
-        members = made.get("anyOf", [])
+        schema = super().union_schema(schema)
+        members = schema.get("anyOf", [])
         plain = bool(members) and all(list(x) == ["type"] for x in members)
-        return {"type": [x["type"] for x in members]} if plain else made
+        return {"type": [x["type"] for x in members]} if plain else schema
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         """Return False: the names of fields are their titles."""
@@ -105,15 +105,15 @@ def _selected_by_type(names: list[str], default: str = "") -> dict[str, Any]:
 
 def _definitions() -> dict[str, Any]:
     """Return the schemas of all elements, shapes and actions by name."""
-    made = {cls.__name__: _table_schema(cls) for cls in ONE_KIND.values()}
+    found = {cls.__name__: _table_schema(cls) for cls in ONE_KIND.values()}
     for category in (*MANY_KINDS, *DEFAULT_KINDS):
-        made |= {name: _table_schema(Element.registry[name], typed=True) for name in element_types(category)}
+        found |= {name: _table_schema(Element.registry[name], typed=True) for name in element_types(category)}
     shapes = {c.__name__: c for c in (*SHAPES, *SURFACES)}
     shapes |= {k: c for k, c in Element.registry.items() if issubclass(c, Solid) and _is_own(c)}
     for base, members in ((Solid, shapes), (Action, Action.registry)):
-        made |= {name: _table_schema(c, typed=True) for name, c in members.items()}
-        made[base.__name__] = {"description": first_doc_line(base)} | _selected_by_type(sorted(members))
-    return dict(sorted(made.items()))
+        found |= {name: _table_schema(c, typed=True) for name, c in members.items()}
+        found[base.__name__] = {"description": first_doc_line(base)} | _selected_by_type(sorted(members))
+    return dict(sorted(found.items()))
 
 
 def _is_own(cls: type) -> bool:
@@ -123,21 +123,21 @@ def _is_own(cls: type) -> bool:
 
 def _type_schema(kind: Any) -> dict[str, Any]:
     """Return the schema of a type; definitions that it refers to are those of `_definitions`."""
-    made = TypeAdapter(kind).json_schema(schema_generator=_FieldSchema)
-    made.pop("$defs", None)
-    return made
+    schema = TypeAdapter(kind).json_schema(schema_generator=_FieldSchema)
+    schema.pop("$defs", None)
+    return schema
 
 
 def _table_schema(cls: type, typed: bool = False) -> dict[str, Any]:
     """Return the schema of the table of an element; ``typed``: its ``type`` names the element."""
-    made = _type_schema(cls)
-    _describe(made["properties"], cls)
+    schema = _type_schema(cls)
+    _describe(schema["properties"], cls)
     kind = {"type": {"description": first_doc_line(cls), "type": "string", "const": cls.__name__}}
     return {
         "description": first_doc_line(cls),
         "type": "object",
-        "properties": (kind if typed else {}) | made["properties"],
-        "required": made.get("required", []),
+        "properties": (kind if typed else {}) | schema["properties"],
+        "required": schema.get("required", []),
         "additionalProperties": False,
     }
 
@@ -156,14 +156,14 @@ def _describe(properties: Mapping[str, dict[str, Any]], cls: type) -> None:
     entries = {name: ArgumentHelp(f"number [{unit.dimension}]") for name, unit in units.items() if unit.dimension}
     for c in reversed(cls.__mro__[:-1]):
         try:
-            told = argument_help(c)
+            described = argument_help(c)
         except ValueError as error:  # of a class of the user's
             raise ModelError(f"no schema of {error}") from None
-        entries |= {k: entry for k, entry in told.items() if entry.text or not entries.get(k, entry).text}
+        entries |= {k: entry for k, entry in described.items() if entry.text or not entries.get(k, entry).text}
     for name, schema in properties.items():
         entry = entries.get(name, ArgumentHelp())
-        said = _SENTENCE_END.split(entry.text)[0]
+        sentence = _SENTENCE_END.split(entry.text)[0]
         plain = entry.choices or entry.type in ("str", "bool", "int")  # as the schema says itself
-        schema["description"] = said if said and plain else f"{entry.type}: {said}".removesuffix(": ")
+        schema["description"] = sentence if sentence and plain else f"{entry.type}: {sentence}".removesuffix(": ")
         if schema.get("default", "") is None:
             del schema["default"]
