@@ -66,9 +66,7 @@ def _curve_table(found: Mapping[str, Differences]) -> ComparisonTable:
     interpolated = any(d.interpolated for d in found.values())
     how = "; interpolated between output times, which differ" if interpolated else ""
     note = f"Differences from the first motion, of the plotted curves{how}."
-    return ComparisonTable(
-        "Curves", ("curve", MOTION, "largest", "at [s]", "final"), tuple(rows), note, tuple(curves)
-    )
+    return ComparisonTable("Curves", ("curve", MOTION, "largest", "at [s]", "final"), tuple(rows), note, tuple(curves))
 
 
 def measurement_table(found: MeasurementComparison, curves: Sequence[str]) -> ComparisonTable:
