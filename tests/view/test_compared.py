@@ -12,7 +12,6 @@ import pytest
 import flyball as fb
 from tests.results.test_differences import cart
 from tests.view.conftest import Opened
-from tests.view.test_page import Open  # noqa: F401
 
 
 @pytest.fixture(scope="module")
