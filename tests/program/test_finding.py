@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import pydoc
 import re
 
 import pytest
@@ -89,3 +90,8 @@ def test_a_wrong_name_of_the_package_gets_candidates(wrong, meant):
     with pytest.raises(AttributeError, match=rf"no attribute '{wrong}'( \(did you mean '{meant}\w*'\?\))?$") as error:
         getattr(fb, wrong)
     assert ("did you mean" in str(error.value)) == (wrong != "Zzz")
+
+
+@pytest.mark.parametrize("kind", [fb.SpringDamper, fb.Sphere, fb.Body, fb.PID])
+def test_help_of_an_element_says_nothing_of_pydantic(kind):
+    assert "pydantic" not in pydoc.plain(pydoc.render_doc(kind)).lower()

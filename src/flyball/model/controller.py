@@ -8,7 +8,6 @@ a sampled controller are constant between instants: laws treat them as states, t
 from __future__ import annotations
 
 import keyword
-from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
@@ -92,7 +91,7 @@ class ControlState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Controller(Element, ABC):
+class Controller(Element):
     """Base class of controllers, whose signals laws of forces and motors, and expressions of events, may name.
 
     ``pid`` is the output of the controller of that name, ``pid.error`` another signal, ``pid.integral`` a state.
@@ -152,9 +151,9 @@ class Controller(Element, ABC):
         """Return the remedy if the controller itself makes the rate of a state jump; empty if only user laws can."""
         return ""
 
-    @abstractmethod
     def given(self) -> dict[str, Any]:
         """Return the user's laws by the names that the formulas use: inputs, gains, limits."""
+        raise NotImplementedError
 
     def derived(self, name: str, wiring: Any) -> SyntaxNode | None:
         """Return what a name of its formulas means that is neither an input nor a signal; None: a name of laws.
@@ -167,13 +166,13 @@ class Controller(Element, ABC):
         """Return the name of an input for messages."""
         return "input" if given == "of" else given
 
-    @abstractmethod
     def signals(self) -> dict[str, str]:
         """Return the formulas of the signals by name, outputs first."""
+        raise NotImplementedError
 
-    @abstractmethod
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """Return its states; ``n`` contains the resolved fields."""
+        raise NotImplementedError
 
 
 def numbered_names(letter: str, count: int) -> tuple[str, ...]:

@@ -113,7 +113,10 @@ Velocity = Annotated[Numbers, Unit("m/s"), Vector()]
 AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(python_data), Unit("rad/s")]
 
 
-CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+class ElementType(type):
+    """Type of element classes: it holds their pydantic configuration, which `help` of a class then does not list."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
@@ -125,7 +128,6 @@ def element(cls: T) -> T:
             cls, globals=frame.f_globals, locals={**frame.f_locals, **vars(cls)}, eval_str=True
         )
     made: Any = dataclass(init=False, frozen=True, kw_only=True)(cls)
-    made.__pydantic_config__ = CONFIG
     signature = _signature(made)
 
     def __init__(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -250,7 +252,7 @@ def _did_you_mean(word: str, known: list[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Element:
+class Element(metaclass=ElementType):
     """A named part of a mechanism.
 
     Parameters
