@@ -86,3 +86,28 @@ def test_errors_of_steps_say_nothing_of_the_dense_output_where_stability_limits_
     for width in (0.5, 1.0, 2.0, 3.0):
         _, off, step, _ = on_the_test_equation(tableau("dop853"), -width)
         assert off < 3.0 * step
+
+
+EMBEDDED_ORDER = {"rk45": 4, "dop853": 5}
+BUILT_IN = tuple(TABLEAUX)  # other tests define methods
+
+
+def test_every_method_has_an_order_of_its_embedded_solution():
+    assert set(EMBEDDED_ORDER) == {name for name in BUILT_IN if tableau(name).E.any()}
+
+
+@pytest.mark.parametrize(("name", "order"), EMBEDDED_ORDER.items())
+def test_order_conditions_of_the_embedded_solution(name, order):
+    """The error estimate E is b less the weights of a solution of lower order (Hairer, Norsett and Wanner, II.2)."""
+    R = tableau(name)
+    stages = R.order_i[1]
+    b = np.zeros(len(R.c))
+    b[:stages] = R.A[stages, :stages]
+    weights, A, c = b - R.E[0], R.A, R.c
+    for k in range(order):
+        assert weights @ c**k == pytest.approx(1 / (k + 1), abs=2e-13)
+    assert abs(weights @ c**order - 1 / (order + 1)) > 1e-6
+    for value, expected in (
+        (weights @ A @ c, 1 / 6), (weights @ (c * (A @ c)), 1 / 8), (weights @ A @ c**2, 1 / 12), (weights @ A @ A @ c, 1 / 24),
+    ):  # fmt: skip
+        assert value == pytest.approx(expected, abs=2e-13)

@@ -1,4 +1,6 @@
-"""Shapes: one file each. A new shape is a new file here; model files, pictures and inertias know it at once.
+"""Shapes: one file each. A new shape is a new file here and a line below for editors.
+
+Model files, pictures and inertias know it at once.
 
 A shape has fields, ``check``, ``volume``, ``centre``, ``gyration`` (per unit mass, about the mass centre), ``size`` and
 ``surface``; where it touches it is made of ``forms`` in space and ``outlines`` in the plane, of the kinds in
