@@ -41,7 +41,7 @@ def test_python_and_files_say_the_same():
     assert again == m
     assert dumps(again) == text
     assert "[[events]]" in text
-    assert '{ type = "Set", parameter = "k", value = "2*k*A.rate" }' in text
+    assert '{type = "Set", parameter = "k", value = "2*k*A.rate"}' in text
     assert m.copy() == m
     assert m.snapshot().events == tuple(m.events)
     assert "events     6: hit (A.angle > 90 deg), back (turned - 1)" in repr(m)

@@ -122,6 +122,8 @@ class ElementType(type):
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Class decorator for frozen, validated fields; the class's own fields are keyword-only."""
+    if not isinstance(cls, ElementType):
+        raise TypeError(f"{cls.__name__} has no base class whose type is ElementType, such as Element")
     if not _is_built_in(cls):  # names of its types may be gone when a first instance is made
         frame = sys._getframe(1)
         cls.__annotations__ = inspect.get_annotations(

@@ -11,12 +11,12 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from .element import Element, Law, LawOf, Laws, Name, Number, Point, Unit, Vector, element, python_data
+from .element import Element, ElementType, Law, LawOf, Laws, Name, Number, Point, Unit, Vector, element, python_data
 from .messages import suggest
 
 
 @dataclass(frozen=True)
-class Action:
+class Action(metaclass=ElementType):
     """An action of an `Event` at its instant."""
 
     registry: ClassVar[dict[str, type[Action]]] = {}
