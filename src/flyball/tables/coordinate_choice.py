@@ -26,7 +26,7 @@ from .law_inputs import forces_in_events
 from .structure_definition import Structure
 from .table_definitions import ARTICULATED, POINT, SCHUR
 
-MOST_ROWS = 6  # rows that a joint can have
+MAX_JOINT_ROWS = 6  # rows that a joint can have
 MAX_FORESTS = 8  # choices that are cached for each mechanism
 
 
@@ -52,7 +52,7 @@ def tree_candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, in
         worth = rows_saved(joint, model.planar)
         a, b = joint_bodies(model, joint)
         if worth > 0 and a != b and alone.isdisjoint((a, b)) and joint.name not in needed and joint.name not in avoided:
-            out[joint.name] = worth + (MOST_ROWS if joint.name in turning else 0)
+            out[joint.name] = worth + (MAX_JOINT_ROWS if joint.name in turning else 0)
     return out
 
 
