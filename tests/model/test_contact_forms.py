@@ -9,6 +9,7 @@ import flyball as fb
 from flyball.collision import shape_kinds
 from flyball.collision import tables as ct
 from flyball.errors import ModelError
+from flyball.model.shapes.geometry import ConvexPart
 from flyball.tables.contact_tables import contact_tables
 from flyball.tables.element_numbers import element_numbers
 from tests.model.test_shapes import SAMPLES
@@ -45,6 +46,12 @@ def put(shape: fb.Mechanism, planar: bool, **fields: object) -> tuple[fb.Mechani
     m = fb.Mechanism("one", planar=planar)
     m.add(fb.Body("b", shape=shape, mass=1, inertia=1 if planar else (1, 1, 1), **fields), fb.Contact(friction=0.1))
     return m, contact_tables(m.snapshot(), element_numbers(m), ["b"]).geometry
+
+
+def test_a_misspelt_kind_of_a_convex_part_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fb.Sphere, "forms", lambda self, n: (ConvexPart("SPHER", (n.radius,), n.radius),))
+    with pytest.raises(ModelError, match=r"Body 'b': Sphere gives a ConvexPart of kind 'SPHER'; kinds: SPHERE, "):
+        put(fb.Sphere(radius=1), False)
 
 
 @pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)

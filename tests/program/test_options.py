@@ -83,9 +83,9 @@ def test_every_argument_of_a_method_is_a_field_and_has_its_line(name):
     assert list(told) == list(asked)
     assert all(t.text.endswith(".") for t in told.values())
     assert first_doc_line(method).endswith((".", "y = C x + D u."))
-    for k, t in told.items():  # what can be chosen includes the default
+    for k, t in told.items():
         if t.choices and isinstance(asked[k].default, str):
-            assert asked[k].default in t.choices
+            assert asked[k].default in t.choices, f"the documented choices of {k} include its default"
     assert "Returns\n-------" in inspect.getdoc(method)
 
 

@@ -29,5 +29,7 @@ from __future__ import annotations
 
 SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID, HEMISPHERE, SOLID = range(12)
 """Numbers of the kinds; a further kind takes the next one."""
+KIND_NUMBERS = {name: value for name, value in globals().items() if name.isupper() and isinstance(value, int)}
+"""Name of a kind -> its number."""
 PLANAR = frozenset((SPHERE, PLANE, POLYGON))
 """Kinds of planar mechanisms."""

@@ -64,7 +64,7 @@ class _PlacedShape:
         return f"the {KIND_NAMES[self.kind]} of {self.part!r}"
 
 
-KIND_NAMES = {getattr(shape_kinds, n): n.lower() for n in dir(shape_kinds) if n.isupper() and n != "PLANAR"}
+KIND_NAMES = {number: name.lower() for name, number in shape_kinds.KIND_NUMBERS.items()}
 
 
 def contact_places(model: Model, given: ElementNumbers) -> ContactPlaces:

@@ -325,7 +325,12 @@ class _ShapeRows:
         """Integers of a shape: kind, first corners and faces, group and surface; each size has corners of its own."""
         group, material = self.groups.of[e.name], s.material or e.material
         row = ct.Shapes.blank(len(sizes))
-        row.kind[:] = getattr(shape_kinds, f.kind)
+        if f.kind not in shape_kinds.KIND_NUMBERS:
+            known = ", ".join(shape_kinds.KIND_NUMBERS)
+            raise ModelError(
+                f"{e.title}: {type(s).__name__}.forms gives a ConvexPart of kind {f.kind!r}; kinds: {known}"
+            )
+        row.kind[:] = shape_kinds.KIND_NUMBERS[f.kind]
         row.count[:] = len(f.vertex) if f.corners is None else f.corners
         row.face_count[:] = f.sides
         row.first[:], row.face_first[:] = self._corners, self._places

@@ -1,8 +1,8 @@
 """All kinds of convex shapes, found in the files of this folder, and formulas that select by kind.
 
-A file declares ``KIND``, its number (`shape_kinds`), and ``support``; it then works with every other convex
-shape. It may also define ``face`` (contacts at more than one point) and ``radius``. All are formulas; ``G`` is
-the `Geometry`, ``i`` the shape, and everything is in the shape's axes:
+A file declares ``KIND``, its number (`shape_kinds`), and ``support``; it then has contacts with every other shape:
+convex shapes, planes and height fields. It may also define ``face`` (contacts at more than one point) and ``radius``.
+All are formulas; ``G`` is the `Geometry`, ``i`` the shape, and everything is in the shape's axes:
 
 - ``support(G, i, d)`` -> the point of its core farthest along ``d``; always the same one of equally far points.
   ``d`` is any vector, not all zeros.
