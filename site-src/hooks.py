@@ -16,7 +16,7 @@ import reference
 
 from flyball.cli.view import SCHEMA_FILE
 from flyball.mechanism import Mechanism
-from flyball.model.model_schema import model_schema
+from flyball.model.json_schema import model_schema
 
 SCHEMA = json.dumps(model_schema(Mechanism), indent=1)  # made before examples define elements of their own
 

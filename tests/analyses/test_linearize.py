@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball.assembly.assemble import assemble
 from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
-from flyball.derivatives.reduced_equations import free_coordinates
+from flyball.derivatives.linearized_equations import free_coordinates
 from flyball.errors import ModelError
 from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt

@@ -50,7 +50,9 @@ def put(shape: fb.Mechanism, planar: bool, **fields: object) -> tuple[fb.Mechani
 
 def test_a_misspelt_kind_of_a_convex_part_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fb.Sphere, "forms", lambda self, n: (ConvexPart("SPHER", (n.radius,), n.radius),))
-    with pytest.raises(ModelError, match=r"Body 'b': Sphere gives a ConvexPart of kind 'SPHER'; kinds: SPHERE, "):
+    with pytest.raises(
+        ModelError, match=r"Body 'b': Sphere\.forms gives a ConvexPart of kind 'SPHER'; kinds: SPHERE, "
+    ):
         put(fb.Sphere(radius=1), False)
 
 

@@ -14,8 +14,8 @@ import flyball as fb
 from flyball.cli.view import model_files
 from flyball.model.element import Element
 from flyball.model.event import Action
+from flyball.model.json_schema import model_schema
 from flyball.model.model_files import dumps
-from flyball.model.model_schema import model_schema
 from flyball.model.snapshot import CATEGORIES
 from tests.errors.test_every_field import CASES as EVERY_FIELD
 from tests.pages import ROOT

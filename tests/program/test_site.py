@@ -16,7 +16,7 @@ import pytest
 import flyball as fb
 from flyball.cli.view import SCHEMA_FILE
 from flyball.model.element import Element
-from flyball.model.model_schema import DIALECT
+from flyball.model.json_schema import DIALECT
 from tests.pages import ROOT
 
 pytest.importorskip("material", reason="the site needs MkDocs Material: pip install 'flyball[docs]'")

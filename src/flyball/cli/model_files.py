@@ -20,7 +20,7 @@ def schema(
     """Print the JSON schema (draft 2020-12) of model files, by which editors complete, explain and check them."""
     with report_errors(False):
         from ..mechanism import Mechanism
-        from ..model.model_schema import model_schema
+        from ..model.json_schema import model_schema
         from ..model.output_files import SCHEMA, file_extension, write_file
 
         text = json.dumps(model_schema(Mechanism), indent=1)

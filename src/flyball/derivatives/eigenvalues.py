@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import AnalysisError
-from .reduced_equations import MatrixUncertainty
+from .linearized_equations import MatrixUncertainty
 
 ENTRY_ROUNDING = 4.0 * np.finfo(float).eps  # smallest relative uncertainty of every entry
 EQUAL_TOLERANCE = 1e-9  # relative difference below which two eigenvalues are equal

@@ -25,7 +25,7 @@ from ..results.mobility import Mobility
 from ..results.result import Result
 from ..tables.values import Values
 from .equation_derivatives import COMPLEX_STEP, MechanismState, complex_step_derivative
-from .reduced_equations import minimum_norm_solution, prescribed_rows
+from .linearized_equations import minimum_norm_solution, prescribed_rows
 
 DIRECT_LIMIT = 400  # up to so many variables curves are differentiated by each of them
 SUBGROUPS = 32  # number of parts that a group of variables is split into

@@ -32,7 +32,7 @@ from .equation_derivatives import (
     residual_rounding,
     state_sizes,
 )
-from .reduced_equations import (
+from .linearized_equations import (
     FreeCoordinates,
     TurningFrame,
     normalised_rows,

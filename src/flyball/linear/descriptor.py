@@ -22,10 +22,8 @@ from ..derivatives.equation_derivatives import (
     has_reaction_friction,
     prescription_derivatives,
 )
-from ..derivatives.nonsmooth_points import nonsmooth_error, nonsmooth_points
-from ..derivatives.output_derivatives import curve_derivatives, curve_gradients, refuse_undetermined_outputs_sparse
-from ..derivatives.reduced_equations import NEARBY_STEP as AWAY
-from ..derivatives.reduced_equations import (
+from ..derivatives.linearized_equations import NEARBY_STEP as AWAY
+from ..derivatives.linearized_equations import (
     PARTICIPATION,
     FreeCoordinates,
     TurningFrame,
@@ -35,6 +33,8 @@ from ..derivatives.reduced_equations import (
     prescribed_rows,
     singular_position_error,
 )
+from ..derivatives.nonsmooth_points import nonsmooth_error, nonsmooth_points
+from ..derivatives.output_derivatives import curve_derivatives, curve_gradients, refuse_undetermined_outputs_sparse
 from ..derivatives.steady_motion import (
     COEFFICIENT_TOLERANCE,
     COMPARISON_ANGLE,

@@ -1,7 +1,7 @@
 """Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
 
-With inputs that move the mechanism (drivers, lengths) the reduced equations (see `reduced_equations`) contain rates of
-inputs, which a change of state eliminates.
+With inputs that move the mechanism (drivers, lengths) the reduced equations (see `linearized_equations`) contain rates
+of inputs, which a change of state eliminates.
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from ..analysis_options import AnalysisOptions
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, state_sizes
-from ..derivatives.nonsmooth_points import refuse_nonsmooth
-from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
-from ..derivatives.reduced_equations import (
+from ..derivatives.linearized_equations import (
     FreeCoordinates,
     InputTerms,
     MatrixUncertainty,
@@ -29,6 +27,8 @@ from ..derivatives.reduced_equations import (
     refuse_singular_position,
     state_names,
 )
+from ..derivatives.nonsmooth_points import refuse_nonsmooth
+from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
 from ..errors import ModelError
 from ..model.contact import has_switching_elements

@@ -10,8 +10,8 @@ import numpy as np
 from ..analysis_options import require_count as at_least
 from ..derivatives.eigenvalues import EQUAL_TOLERANCE, Spectrum, spectrum
 from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.linearized_equations import TurningFrame
 from ..derivatives.output_derivatives import snapshot
-from ..derivatives.reduced_equations import TurningFrame
 from ..model.contact import has_switching_elements
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_sampled_controllers, refuse_switching_with_controllers

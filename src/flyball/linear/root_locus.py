@@ -26,7 +26,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from ..derivatives.eigenvalues import spectrum
-from ..derivatives.reduced_equations import FreeCoordinates, ReducedEquations, TurningFrame
+from ..derivatives.linearized_equations import FreeCoordinates, ReducedEquations, TurningFrame
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_sampled_controllers, refuse_unsupported

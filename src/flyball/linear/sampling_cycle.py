@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..derivatives.eigenvalues import Spectrum, spectrum
-from ..derivatives.reduced_equations import MatrixUncertainty
+from ..derivatives.linearized_equations import MatrixUncertainty
 from ..errors import ModelError
 from ..results.linear_model import StateSpaceForm
 

@@ -24,9 +24,11 @@ from ..engine.loads import apply_wrench, euler_moment
 from ..errors import ModelError
 from ..laws.bytecode import STACK_RESERVE, evaluate_jet
 from ..math.vec import add, cross, load3, load9, mtv, mv, neg, scale, store3, sub
+from ..model.body import GROUND
 from ..model.contact_point import Touch
 from ..model.force import CoordinateForce
-from ..model.messages import suggest
+from ..model.joint import Joint
+from ..model.messages import listing, suggest
 from ..tables.constraint_rows import reacting_element
 from ..tables.table_definitions import Wrenches
 from .motion_record import (
@@ -63,6 +65,36 @@ class JointReactions:
                 force, torque = add(force, more[0]), add(torque, more[1])
             self._known[joint] = force, torque
         return self._known[joint]
+
+    def in_axes(self, e: Joint, axes: str, on: str | None) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque [N m] of a joint on one of its bodies in named axes, (n, 3) each.
+
+        Raises
+        ------
+        ModelError
+            If the joint has no such axes, or does not act on that body.
+        """
+        names = [self._result.values.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        on = names[1] if on is None else on
+        if on not in names:
+            raise ModelError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}{suggest(str(on), names)}")
+        force, torque = self.of(e.name)
+        if axes != "world":
+            R = self.axes(e, axes)
+            force, torque = mtv(R, force), mtv(R, torque)
+        sign = 1.0 if on == names[1] else -1.0
+        return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
+
+    def axes(self, e: Joint, axes: str) -> tuple:
+        """Rotation, world from the axes ``"joint"`` or those of one of the joint's two bodies, row by row."""
+        records, s = self._result.records, self._result.values.structure
+        if axes == "joint":
+            return records.frame(s.frame_at[e.name, "F", ""])[1]
+        names = [s.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        if axes not in names:
+            known = ["world", "joint", *names]
+            raise ModelError(f"{e.title} has no axes {axes!r}{suggest(str(axes), known)}; {listing(known)}")
+        return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     def _of_rows(self, joint: str) -> Wrench:
         """Return the wrench of the joint's own rows."""

@@ -18,8 +18,8 @@ from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, StateSizes, state_sizes
+from ..derivatives.linearized_equations import free_coordinates
 from ..derivatives.output_derivatives import snapshot
-from ..derivatives.reduced_equations import free_coordinates
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
 from ..model.contact import has_switching_elements
 from ..model.element_laws import with_inputs

@@ -27,9 +27,9 @@ from ..derivatives.equation_derivatives import (
     is_balanced_beyond_rounding,
     unbalanced_fraction,
 )
+from ..derivatives.linearized_equations import free_coordinates, prescribed_rows
 from ..derivatives.nonsmooth_points import nonsmooth_points
 from ..derivatives.output_derivatives import snapshot
-from ..derivatives.reduced_equations import free_coordinates, prescribed_rows
 from ..derivatives.steady_motion import rate_description
 from ..engine.kinematics import retract
 from ..errors import ModelError, NotConverged, SingularityError

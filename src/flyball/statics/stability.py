@@ -29,8 +29,7 @@ from ..derivatives.equation_derivatives import (
     stiffness_rounding,
     unbalanced_fraction,
 )
-from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points
-from ..derivatives.reduced_equations import (
+from ..derivatives.linearized_equations import (
     DENSE_UNKNOWNS,
     FreeCoordinates,
     TurningFrame,
@@ -38,6 +37,7 @@ from ..derivatives.reduced_equations import (
     minimum_norm_solution,
     reduced_equations,
 )
+from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points
 from ..engine.kinematics import retract
 from ..errors import AnalysisError
 from ..numerics.rank import null_space

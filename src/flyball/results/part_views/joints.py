@@ -10,9 +10,7 @@ from ...engine.rows import COEFFICIENT
 from ...errors import ModelError
 from ...math.scalar import atan2, rounded
 from ...math.vec import mtv, sub
-from ...model.body import GROUND
 from ...model.controller_signals import signal_law
-from ...model.messages import listing, suggest
 from ...tables.forest import coordinate_row
 from ..motion_record import FULL_TURN, Wrench, measured_coordinate
 from .base import PartView, components_array
@@ -94,34 +92,12 @@ class JointView(PartView):
         force [N], torque [N m] : ndarray (n, 3)
             The torque is about the joint's point on ``body_j`` (for a two-point link: its second end).
         """
-        e, s = self.element, self._x.structure
-        force, torque = self._wrench()
-        names = [s.model.carrier(name, e) for name in (e.body_i, e.body_j)]
-        on = names[1] if on is None else on
-        if on not in names:
-            raise ModelError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}{suggest(str(on), names)}")
-        if axes != "world":
-            R = self._axes(axes, names)
-            force, torque = mtv(R, force), mtv(R, torque)
-        sign = 1.0 if on == names[1] else -1.0
-        return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
+        return self._result.reactions.in_axes(self.element, axes, on)
 
     def rotation(self, axes: str) -> np.ndarray:
         """Return rotation matrices, world from the axes named as in `reaction`, (n, 3, 3)."""
-        e = self.element
-        names = [self._x.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
-        full = [np.broadcast_to(x, len(self._result.t)) for x in self._axes(axes, names)]
+        full = [np.broadcast_to(x, len(self._result.t)) for x in self._result.reactions.axes(self.element, axes)]
         return np.stack(full, axis=1).reshape(-1, 3, 3)
-
-    def _axes(self, axes: str, names: list[str]) -> tuple:
-        records, x = self._result.records, self._x
-        if axes == "joint":
-            return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
-        if axes not in names:
-            known = ["world", "joint", *names]
-            hint = suggest(str(axes), known)
-            raise ModelError(f"{self.element.title} has no axes {axes!r}{hint}; {listing(known)}")
-        return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     @property
     def force(self) -> np.ndarray:

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import gap_lengths, lost_constraints, normalised_rows, product
+from ...derivatives.linearized_equations import gap_lengths, lost_constraints, normalised_rows, product
 from ...errors import ModelError, SingularityError
 from ...expression_graph.graph import Node, evaluate, evaluate_array, jacobian, nodes_in_order, symbols_of, zero_objects
 from ...expression_graph.tracing import TracedEquations

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import product
+from ...derivatives.linearized_equations import product
 from ...errors import AnalysisError, SingularityError
 from ...expression_graph.graph import CALL, NUMBER, OPERATIONS, SYMBOL, Node, evaluate, jacobian, symbols_of
 from .linear_systems import Determinants, solve_blocks

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import gap_lengths, normalised_rows, product
+from ...derivatives.linearized_equations import gap_lengths, normalised_rows, product
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.graph import (
     Node,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import product
+from ...derivatives.linearized_equations import product
 from ...expression_graph.graph import zero_objects
 from ...math.scalar import sqrt
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...assembly.compiled_mechanism import compile_mechanism
 from ...derivatives.equation_derivatives import usual_states
-from ...derivatives.reduced_equations import gap_lengths, lost_constraints, product
+from ...derivatives.linearized_equations import gap_lengths, lost_constraints, product
 from ...errors import AnalysisError, ModelError
 from ...expression_graph.graph import (
     ADD,

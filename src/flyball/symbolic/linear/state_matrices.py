@@ -6,8 +6,8 @@ are differentiated by positions (along the velocities, so that quaternions have 
 controller states, accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions'
 directions, d(G^T lam)/dx, is in dr/dx.
 
-`derivatives/reduced_equations` has the equations of the elimination. Independent rows and coordinates are chosen by the
-values of the parameters, with the pivoting of `Mechanism.linearize`; the basis consists of expressions.
+`derivatives/linearized_equations` has the equations of the elimination. Independent rows and coordinates are chosen by
+the values of the parameters, with the pivoting of `Mechanism.linearize`; the basis consists of expressions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import (
+from ...derivatives.linearized_equations import (
     InputTerms,
     ReducedEquations,
     acting_terms,

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...derivatives.reduced_equations import product
+from ...derivatives.linearized_equations import product
 from ...errors import ModelError, import_optional
 from ...expression_graph.graph import Node, evaluate, zero_objects
 from ...model.messages import listing, suggest

@@ -1,6 +1,6 @@
 """The format of model files as a JSON schema (draft 2020-12), by which editors complete, explain and check them.
 
-The schema is schema from the elements: types and defaults of their fields, and the entries of their docstrings. It has
+The schema is made from the elements: types and defaults of their fields, and the entries of their docstrings. It has
 what can be known of one field alone. What depends on several fields, on units or on other elements (a name that does
 not exist) is found when the file is loaded.
 """
