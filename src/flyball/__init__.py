@@ -73,6 +73,7 @@ Read a result
     run.compare("test.csv")       -> MeasurementComparison with measured curves: deviations
     run.differences(other)        -> Differences of two motions: parameters, parts, curves, events, health
     run.spectrum("A.rate")        -> Spectrum: amplitudes and power spectral densities over frequency
+    run.momentum("crank")         -> Momentum of bodies, groups or the whole: linear, and angular about any point
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
                                   read by load_study
@@ -160,6 +161,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
     from .results.modes import RootLocus as RootLocus
+    from .results.momentum import Momentum as Momentum
     from .results.result import Result as Result
     from .results.sensitivity_and_optimum import Fit as Fit
     from .results.sensitivity_and_optimum import Optimum as Optimum
@@ -244,6 +246,7 @@ _HOME = {
     "RootLocus": "results.modes",
     "Sensitivity": "results.sensitivity_and_optimum",
     "Singularities": "results.singularities",
+    "Momentum": "results.momentum",
     "Spectrum": "results.spectrum",
     "Study": "results.study",
     "Touch": "results.equilibrium",

@@ -61,6 +61,7 @@ MADE = {
     "MeasurementComparison": lambda: (
         crank().simulate(0.02, outputs=3).compare({"t": [0.0, 0.01], "slider.x": [0.7, 0.69]})
     ),
+    "Momentum": lambda: crank().simulate(0.02, outputs=3).momentum(),
     "Spectrum": lambda: crank().simulate(0.2, outputs=101).spectrum("A.angle_rate", "slider.x"),
 }
 

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
     from .differences import Differences
     from .measurements import MeasurementComparison
+    from .momentum import Momentum
     from .spectrum import Spectrum
 
 
@@ -251,7 +252,7 @@ class Result:
     def __contains__(self, name: object) -> bool:
         """Return whether there is a part, or a quantity, of that name."""
         owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
-        if owner not in self.parts() and self._set_of(owner) is None:
+        if owner not in self.parts() and self.set_of_bodies(owner) is None:
             return False
         return not dot or what in self._view(owner).names
 
@@ -264,14 +265,14 @@ class Result:
     def _viewed(self, name: str) -> Any:
         if name == ENERGY:
             return self.energy
-        if (found := self._set_of(name)) is None:
+        if (found := self.set_of_bodies(name)) is None:
             if self.pieces:
                 return SplicedView([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
             return view_of(self, self.model[name])
         own, k = found
         return BodySetView(self, own) if k is None else SetMemberView(self, own, k)
 
-    def _set_of(self, name: str) -> tuple[BodySetMotion, int | None] | None:
+    def set_of_bodies(self, name: str) -> tuple[BodySetMotion, int | None] | None:
         """Return the set of bodies of a name; for a member such as ``"balls[17]"`` its set and its index.
 
         Raises
@@ -463,6 +464,32 @@ class Result:
         from .differences import compare_results
 
         return compare_results(self, other, names)
+
+    def momentum(self, *bodies: str, about: Any = "com") -> Momentum:
+        """Return the linear and angular momentum of bodies over time.
+
+        Inertias of rotors (`RotorInertia`) are not part of it.
+
+        Parameters
+        ----------
+        *bodies : str
+            Bodies, sets of bodies or members of sets; without names the whole mechanism.
+        about : str or coordinates [m]
+            Point of the angular momentum: ``"com"``, the common mass centre of the bodies; the origin of a body or a
+            frame, by its name; or a point of the world, ``(0, 0, 0)``.
+
+        Returns
+        -------
+        Momentum
+
+        Raises
+        ------
+        ModelError
+            If there is no such moving body, or ``about`` is no point.
+        """
+        from .momentum import result_momentum
+
+        return result_momentum(self, bodies, about)
 
     def spectrum(
         self,

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from ..results.comparison import Comparison
     from ..results.measurements import MeasurementComparison
+    from ..results.momentum import Momentum
     from ..results.result import Result
     from ..results.spectrum import Spectrum
 
@@ -207,7 +208,45 @@ def measurement_plot(comparison: MeasurementComparison, path: str | os.PathLike 
         return finish_figure(drawing, path)
 
 
+NAMED_BODIES = 4  # number of bodies that a title names
 DENSITY_DECADES = 12  # shown below the largest power spectral density
+
+
+def momentum_plot(momentum: Momentum, path: str | os.PathLike | None = None) -> Any:
+    """Draw the components of the linear and angular momentum over time.
+
+    Parameters
+    ----------
+    momentum : Momentum
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Returns
+    -------
+    Figure, or None where a file was written.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written.
+    """
+    with plot_style():
+        drawing = new_figure(6.0)
+        upper, lower = drawing.subplots(2, 1, sharex=True)
+        for ax, values, title, unit in (
+            (upper, momentum.linear, "momentum", "kg m/s"),
+            (lower, momentum.angular, "angular momentum", "kg m^2/s"),
+        ):
+            columns = values.reshape(len(values), -1).T
+            for k, (name, x) in enumerate(zip("xyz" if len(columns) > 1 else "z", columns, strict=False)):
+                ax.plot(momentum.t, x, label=name, **_curve_style(k))
+            ax.set_ylabel(axis_label(title, unit.replace("^2", "²")))
+            ax.legend(loc="upper right")
+        lower.set_xlabel("t [s]")
+        few = len(momentum.bodies) <= NAMED_BODIES
+        bodies = ", ".join(momentum.bodies) if few else f"{len(momentum.bodies)} bodies"
+        set_title(drawing, f"Momentum of {bodies} about {momentum.about}")
+        return finish_figure(drawing, path)
 
 
 def spectrum_plot(spectrum: Spectrum, path: str | os.PathLike | None = None) -> Any:
