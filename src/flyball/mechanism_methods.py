@@ -789,6 +789,7 @@ class StaticsMethods(Model):
         t: float | str | None = None,
         parameters: Mapping[str, float | str] | None = None,
         coordinates: str = "auto",
+        independent: Sequence[str] = (),
         frozen: bool = False,
     ) -> LinearModel:
         """Linear equations about an equilibrium or a steady motion: x' = A x + B u, y = C x + D u.
@@ -807,16 +808,19 @@ class StaticsMethods(Model):
             Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``. Work and
             the energy balance are refused, since they are counted from the start of a motion.
         about : Result or Equilibrium, optional
-            Operating point: the end of a motion, or an equilibrium; if not given: the mechanism assembled at ``t``.
+            Operating point: a motion at ``t``, or an equilibrium; if not given: the mechanism assembled at ``t``.
         t : float or str [s], optional
-            Time, 0 if not given; not with ``about``, which has its own.
+            Time, 0 if not given; an output time of a motion, its end if not given.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
             Coordinates whose deviations are the states. At rest, with more than 150 degrees of freedom or 600
             velocities, dense matrices are computed on demand, and `LinearModel.descriptor` uses absolute coordinates.
+        independent : sequence of str
+            Coordinates whose changes are the states, by pivoting if not given: the same at all times of a motion.
         frozen : bool
-            Linearise at one instant of a motion that need not be steady: the eigenvalues then mean little.
+            Linearise at one instant of a motion that need not be steady: A(t), B(t), C(t), D(t) of the equations along
+            the motion. The eigenvalues of A(t) then mean little.
 
         Returns
         -------
@@ -850,9 +854,9 @@ class StaticsMethods(Model):
         Parameters
         ----------
         about : Result or Equilibrium, optional
-            Operating point: the end of a motion, or an equilibrium; if not given: the mechanism assembled at ``t``.
+            Operating point: a motion at ``t``, or an equilibrium; if not given: the mechanism assembled at ``t``.
         t : float or str [s], optional
-            Time, 0 if not given; not with ``about``, which has its own.
+            Time, 0 if not given; an output time of a motion, its end if not given.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}

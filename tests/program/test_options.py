@@ -165,7 +165,7 @@ def test_nothing_to_stabilise():
         (lambda m: m.simulate(1, max_steps=0.5), "max_steps must be a whole number"),
         (lambda m: m.simulate(1, max_step="0 s"), "max_step must be greater than 0"),
         (lambda m: m.modes(frozen="yes"), "frozen is True or False"),
-        (lambda m: m.modes(about=m.simulate(0.1), t=1), "about has its own time"),
+        (lambda m: m.modes(about=m.simulate(0.1), t=1), "t = 1 s is no output time of the motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], t_end=1), "t_end applies to a motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], rtol=1e-3), "rtol applies to a motion"),
         (lambda m: m.sensitivity(["b.x"], ["k"], about="equilibrium"), "about is for modes"),

@@ -400,17 +400,16 @@ def values_with_complex_step(c: CompiledMechanism, name: str) -> Values:
     return values(c.structure, c.parameters | {name: complex(value, COMPLEX_STEP)})  # type: ignore[arg-type]
 
 
-def prescription_derivatives(x: MechanismState, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives (n,) each of q - f(t) and v - f'(t) of prescribed coordinates, from values with a complex step."""
+def prescription_derivatives(x: MechanismState, stepped: Values) -> np.ndarray:
+    """Derivatives (3, n) of q - f(t), v - f'(t), v' - f''(t) of prescribed coordinates, by a complex step in values."""
     S = complex_system(stepped.system)
     stack = np.zeros((x.c.structure.depth + 1, 3), complex)
     out = []
     for b in x.c.structure.prescribed.values():
         law = int(S.tree.law[b])
-        f, f1, _ = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
-        out.append((-complex_step_derivative(f - S.bodies.offset[b]), -complex_step_derivative(f1)))
-    found = np.array(out).reshape(-1, 2)
-    return found[:, 0], found[:, 1]
+        f, f1, f2 = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
+        out.append([-complex_step_derivative(y) for y in (f - S.bodies.offset[b], f1, f2)])
+    return np.array(out).reshape(-1, 3).T
 
 
 def refuse_function_laws(s: Structure) -> None:

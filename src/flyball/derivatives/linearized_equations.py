@@ -30,6 +30,7 @@ import numpy as np
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..engine.kinematics import retract
 from ..errors import ModelError, SingularityError
+from ..model.messages import listing, suggest
 from ..numerics.rank import (
     RANK_TOLERANCE,
     clearly_independent,
@@ -92,13 +93,14 @@ class FreeMotions(Protocol):
 class InputTerms:
     """Derivatives of the equations by m inputs at a fixed state.
 
-    r_w (nv, m), g_w (holonomic, m), n_w (rows, m), s_w (nz, m).
+    r_w (nv, m), g_w (holonomic, m), n_w (rows, m), s_w (nz, m); a_w (rows, m) only where the motion is not steady.
     """
 
     r: np.ndarray
     g: np.ndarray
     n: np.ndarray
     s: np.ndarray
+    a: np.ndarray | None = None
 
 
 class ConstrainedChanges(NamedTuple):
@@ -375,6 +377,47 @@ def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None
     left_v = left if chosen_v is chosen else _selection_rows(chosen_v, s.nv)
     on_positions = np.r_[which, np.ones(len(given), bool)]
     return FreeCoordinates(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
+
+
+DETERMINED = 1e-6  # smallest singular value of the chosen part of an orthonormal basis of the free motions
+
+
+def coordinates_named(e: EquationDerivatives, independent: Sequence[str]) -> FreeCoordinates:
+    """Free coordinates whose changes of position are those of the named coordinates.
+
+    Raises
+    ------
+    ModelError
+        If there is no such coordinate, or their number is not that of the degrees of freedom.
+    SingularityError
+        If they do not determine the motions that the constraints allow.
+    """
+    names = [n.name for n in velocity_names(e.state.c.structure)]
+    for k, name in enumerate(independent):
+        if name not in names:
+            layer = "joint" if e.state.c.structure.tree else "absolute"
+            raise ModelError(
+                f"independent: {name!r} is no coordinate of the equations, which are in {layer} coordinates"
+                f"{suggest(name, names)}; {listing(names)}"
+            )
+        if name in independent[:k]:
+            raise ModelError(f"independent: {name!r} is given twice")
+    f = free_coordinates(e)
+    if len(f.chosen) != len(independent):
+        raise ModelError(
+            f"independent: {len(independent)} coordinates are given, and the mechanism has {len(f.chosen)} degrees of "
+            f"freedom at t = {e.state.t:.6g} s, for instance of {', '.join(f.labels)}"
+        )
+    chosen = np.array([names.index(name) for name in independent], int)
+    motions = np.linalg.qr(f.Z / f.scale[:, None])[0]
+    if len(chosen) and np.linalg.svd(motions[chosen], compute_uv=False)[-1] < DETERMINED:
+        raise SingularityError(
+            f"independent: {', '.join(independent)} do not determine the motion of the mechanism at t = "
+            f"{e.state.t:.6g} s; choose other coordinates, for instance {', '.join(f.labels)}",
+            e.state.t,
+            tuple(independent),
+        )
+    return free_coordinates(e, replace(f, chosen=chosen, chosen_v=chosen if f.chosen_v is f.chosen else f.chosen_v))
 
 
 def _selection_rows(which: np.ndarray, n: int) -> np.ndarray:
@@ -674,12 +717,15 @@ class TurningFrame:
         (rate of a change of position) = (change of velocity) + N (change of position).
     description : str
         Description for messages and reports; empty at rest.
+    steady : bool
+        Whether the coefficients are constant as seen from the frame; if not, the equations are those of one instant.
     """
 
     turning: np.ndarray
     H: np.ndarray
     N: np.ndarray
     description: str = ""
+    steady: bool = True
 
 
 def reduced_equations(
@@ -699,6 +745,8 @@ def reduced_equations(
     w = w or InputTerms(*(np.zeros((n, 0)) for n in (nv, len(f.holonomic), len(f.rows), e.nz)))
     V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((len(f.rows) - e.block("n").size, nv))])
     c = constrained_changes(f, w, V, turning)
+    if not frame.steady:
+        c = c._replace(known=_accelerations_of_constraints(e, f, c, w))
     others = acting_terms(c, M @ H + D, K, e.by_state[r], w.r)
     laws = acting_terms(c, T, S, Z, w.s)
     by_multipliers = -f.rows.T
@@ -726,6 +774,26 @@ def reduced_equations(
     out = ReducedEquations(rate, c.x, c.u, acceleration, multipliers, c.z, laws, changes, uncertainty=doubt)
     out.add_second_order(f, Y, terms.mass, (M, M @ H + D, K), turning)
     return out
+
+
+def _accelerations_of_constraints(
+    e: EquationDerivatives, f: FreeCoordinates, c: ConstrainedChanges, w: InputTerms
+) -> np.ndarray:
+    """Changes of the accelerations that keep the constraints and are zero along the chosen velocities.
+
+    Along any motion the second derivative of the constraints, G v' - gamma = 0, is perturbed:
+    G u' + a_x x + a_u u + a_w w + (n_w + g_w') w' + g_w w'' = 0, where g_w' = n_w for constraints on positions. In a
+    steady motion this is the derivative of the perturbed constraints with constant coefficients.
+    """
+    a, m = e.at["a"], w.r.shape[1]
+    below = ((0, len(f.rows) - e.block("n").size), (0, 0))  # prescribed coordinates depend on inputs only
+    right = np.pad(e.by_position[a].toarray(), below) @ c.x + np.pad(e.by_velocity[a].toarray(), below) @ c.u
+    if m:
+        assert w.a is not None
+        second = np.zeros((len(f.rows), m))
+        second[f.on_positions] = w.g
+        right[:, -3 * m :] += np.hstack([w.a, w.n * np.where(f.on_positions, 2.0, 1.0)[:, None], second])
+    return f.dependent_velocities(right)
 
 
 def massless_motion_error(name: str) -> ModelError:

@@ -26,6 +26,7 @@ from ..derivatives.linearized_equations import NEARBY_STEP as AWAY
 from ..derivatives.linearized_equations import (
     PARTICIPATION,
     FreeCoordinates,
+    InputTerms,
     TurningFrame,
     massless_motion_error,
     massless_rotations,
@@ -58,23 +59,15 @@ def values_with_input_step(e: EquationDerivatives, i: Input) -> Values:
     return e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
 
 
-def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, ...]:
-    """Derivatives by the inputs.
-
-    Of the equations of motion (nv, inputs), of all constraints and of their velocity form (rows and prescribed
-    coordinates, inputs), and of the laws of controller states (nz, inputs).
-    """
-    by, g, n = [], [], []
-    for i in inputs:
-        values = values_with_input_step(e, i)
-        by.append(e.by_values(values))
-        told = prescription_derivatives(e.state, values)
-        g.append(told[0])
-        n.append(told[1])
-    W = np.array(by).reshape(len(inputs), e.width).T
+def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> InputTerms:
+    """Derivatives by the inputs; those of constraints, also of forms without positions, have all rows."""
+    every = [values_with_input_step(e, i) for i in inputs]
+    W = np.array([e.by_values(values) for values in every]).reshape(len(inputs), e.width).T
     prescribed = len(e.state.c.structure.prescribed)
-    given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
-    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates]), W[e.at["s"]]
+    given = np.array([prescription_derivatives(e.state, values) for values in every])
+    given = given.reshape(len(inputs), 3, prescribed).T
+    g, n, a = (np.vstack([W[e.at[name]], given[:, k]]) for k, name in enumerate("gna"))
+    return InputTerms(W[e.at["r"]], g, n, W[e.at["s"]], a)
 
 
 # Up to so many velocities and freedoms the constraints are eliminated and the matrices are dense.
@@ -270,10 +263,21 @@ def sparse_descriptor(whole: SparseEquations, inputs: Sequence[Input], outputs: 
 def dense_descriptor(
     e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame, inputs: Sequence[Input], outputs: Sequence[str]
 ) -> Descriptor:
-    """Descriptor form of any mechanism, in the coordinates of its equations."""
+    """Descriptor form of any mechanism, in the coordinates of its equations.
+
+    Raises
+    ------
+    AnalysisError
+        If the motion is not steady and there are constraints, whose coefficients change with time.
+    """
     import scipy.sparse as sp
 
     G = unit_rows(_all_rows(e) @ sp.diags(f.scale))[0]
+    if not frame.steady and G.shape[0]:
+        raise AnalysisError(
+            "a descriptor has constant coefficients, and along a motion that is not steady those of the constraints "
+            "change with time; A, B, C and D include that change"
+        )
     return _assembled_descriptor(
         e,
         np.setdiff1d(np.arange(G.shape[0]), weak_pivots(G @ G.T)[0]) if G.shape[0] else np.zeros(0, int),
@@ -309,9 +313,9 @@ def _assembled_descriptor(
     G = _all_rows(e)
     others = G.shape[0] - len(s.rows)
     holonomic = np.r_[[r.holonomic for r in s.rows], np.ones(others, bool)].astype(bool)
-    r, g, n, s_w = input_effects(e, inputs)
-    gaps = np.where(holonomic[: len(g), None], g, n)
-    gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(g), len(inputs)))])
+    w = input_effects(e, inputs)
+    gaps = np.where(holonomic[: len(w.g), None], w.g, w.n)
+    gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(gaps), len(inputs)))])
     V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
     C = C.tocsc()
     nv, held = s.nv, len(s.rows) + len(s.prescribed)
@@ -331,7 +335,7 @@ def _assembled_descriptor(
         by_position=V[rows].tocsr(),
         kinematic=kinematic.tocsr(),
         turning=turned.tocsr(),
-        forces=r,
+        forces=w.r,
         gaps=gaps[rows],
         C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] for k in range(3)), by_rows]).tocsr(),
         D=D,
@@ -340,7 +344,7 @@ def _assembled_descriptor(
         rows=tuple(of[k] for k in rows),
         scale=c.sizes / c.values.length,
     )
-    return _with_controllers(out, e, C[:, C.shape[1] - e.nz :], s_w) if e.nz else out
+    return _with_controllers(out, e, C[:, C.shape[1] - e.nz :], w.s) if e.nz else out
 
 
 def _with_controllers(d: Descriptor, e: EquationDerivatives, by_state: Any, by_input: np.ndarray) -> Descriptor:

@@ -22,6 +22,7 @@ from ..derivatives.linearized_equations import (
     MatrixUncertainty,
     ReducedEquations,
     TurningFrame,
+    coordinates_named,
     free_coordinates,
     reduced_equations,
     refuse_singular_position,
@@ -40,7 +41,7 @@ from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
 from ..results.events import CUMULATIVE_ENERGIES
 from ..results.linear_model import Descriptor, LinearModel, StateSpaceForm
-from ..results.result import Result
+from ..results.result import Result, motion_until
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..statics.stability import stability_by_eigenvalues
 from .descriptor import (
@@ -73,8 +74,11 @@ class OperatingPointOptions(AnalysisOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.about is not None and self.t is not None:
-            raise ModelError("about has its own time: leave out t")
+        if isinstance(self.about, Equilibrium) and self.t is not None:
+            raise ModelError("an equilibrium has its own time: leave out t")
+        if isinstance(self.about, Result) and self.t is not None:
+            object.__setattr__(self, "about", motion_until(self.about, self.t))
+            object.__setattr__(self, "t", None)
         if self.frozen and isinstance(self.about, Equilibrium) and not self.about.speeds:
             raise ModelError("frozen applies to a motion; it has no effect at an equilibrium, so leave it out")
 
@@ -91,6 +95,7 @@ class LinearizeOptions(OperatingPointOptions):
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    independent: tuple[str, ...]
 
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
@@ -113,8 +118,9 @@ def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
     here = model
     if o.about is None:  # only the copy with inputs is assembled
         here, named = with_inputs(model, o.inputs)
-    x = o.state(here, partial(exceeds_dense_size, DENSE_FREEDOMS))
-    large = uses_sparse_equations(x, DENSE_FREEDOMS)
+    many = None if o.independent else partial(exceeds_dense_size, DENSE_FREEDOMS)
+    x = o.state(here, many)
+    large = not o.independent and uses_sparse_equations(x, DENSE_FREEDOMS)
     if not large and exceeds_dense_size(DENSE_FREEDOMS, len(x.v), len(x.c.structure.rows)):
         x = o.state(here)
     if o.about is not None:
@@ -174,7 +180,7 @@ def _checked_reduction(
     x: MechanismState, o: LinearizeOptions, named: list[Input]
 ) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame, ReducedEquations]:
     """Equations with the constraints eliminated; inputs and outputs that have no linear equations are refused."""
-    e, f, frame = _reduction_at(x, o.frozen, to=_parameter_inputs(named))
+    e, f, frame = _reduction_at(x, o.frozen, o.independent, to=_parameter_inputs(named))
     r = reduced_equations(e, f, frame, _input_terms(e, f, named))
     if frame.turning.any() and (named or o.outputs):
         _refuse_frame_dependence(e, f, r, frame, named, o.outputs)
@@ -244,21 +250,25 @@ def equations_without_inputs(
 def _reduction_at(
     x: MechanismState,
     frozen: bool,
-    like: FreeCoordinates | None = None,
+    like: FreeCoordinates | Sequence[str] | None = None,
     to: Sequence[str] = (),
 ) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame]:
+    """Equations at a state, free coordinates (``like`` others, or by their names), and the frame."""
     if x.c.structure.controls:
         x.c.at(x.t, x.q, x.v)
         refuse_contradicting_limits(x.c, x.t)
     e = EquationDerivatives(x)
-    f = free_coordinates(e, like)
+    if like is None or isinstance(like, FreeCoordinates):
+        f = free_coordinates(e, like)
+    else:
+        f = coordinates_named(e, like) if like else free_coordinates(e)
     refuse_singular_position(e, f)
     states = np.zeros((len(x.v), e.nz))
     dq, dv = np.hstack([f.Z, 0.0 * f.Zv, states]), np.hstack([0.0 * f.Z, f.Zv, states])
     dz = np.eye(e.nz, dq.shape[1], dq.shape[1] - e.nz)
     refuse_nonsmooth(e, dq, dv, dz, to=to)
     still = np.zeros((len(x.v),) * 2)
-    frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x)) if frozen else steady_frame(x, e, f)
+    frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x), steady=False) if frozen else steady_frame(x, e, f)
     frame.description = frame_description(x, frame, frozen)
     return e, f, frame
 
@@ -272,8 +282,8 @@ def _in_copy(model: Model, x: MechanismState) -> MechanismState:
 
 def _input_terms(e: EquationDerivatives, f: FreeCoordinates, inputs: list[Input]) -> InputTerms:
     """Derivatives of the equations by the inputs."""
-    r, g, n, s = input_effects(e, inputs)
-    return InputTerms(r, g[f.on_positions], n, s)
+    w = input_effects(e, inputs)
+    return replace(w, g=w.g[f.on_positions])
 
 
 def _output_matrix(

@@ -600,6 +600,35 @@ class Result:
         return f"<Result of {self.model.name!r}: {span}>\n{self.health}"
 
 
+TIME_ROUNDING = 1e-12  # difference of times, relative to the motion's length, that counts as none
+
+
+def motion_until(result: Result, t: float) -> Result:
+    """Return the motion up to one of its output times; at an event that is the state after it.
+
+    Raises
+    ------
+    ModelError
+        If it is none of the output times.
+    """
+    near = int(np.argmin(np.abs(result.t - t))) if len(result.t) else 0
+    if not len(result.t) or abs(result.t[near] - t) > TIME_ROUNDING * np.ptp(result.t):
+        times = f"; the nearest is {result.t[near]:.6g} s" if len(result.t) else ""
+        raise ModelError(f"t = {t:g} s is no output time of the motion{times}. Give it in outputs=")
+    n = int(np.flatnonzero(result.t == result.t[near])[-1]) + 1
+    if n == len(result.t):
+        return result
+    t_, q, v, states, vdot, multipliers = (
+        getattr(result, name)[:n] for name in ("t", "q", "v", "states", "vdot", "multipliers")
+    )
+    phases = None if result.phases is None else Phases(tuple(x for x in result.phases.cut(n).all if x.rows))
+    values = result.values if phases is None else phases.all[-1].values
+    out = Result(result.model, values, t_, q, v, states, vdot, multipliers, result.health)
+    out.phases, out.wound, out.begun = phases, result.wound, result.begun
+    out.final = float(t_[-1]), np.concatenate([q[-1], v[-1], states[-1]])
+    return out
+
+
 def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
     """Concatenate the parts to one result at the requested output times; the last row of the last part is kept, too.
 

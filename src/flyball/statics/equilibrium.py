@@ -186,7 +186,8 @@ def _are_similar(a: StateSizes, b: StateSizes) -> bool:
 
 
 LINEARIZE_DEFAULTS: dict[str, Any] = {
-    "t": None, "parameters": None, "coordinates": "auto", "frozen": False, "inputs": (), "outputs": ()
+    "t": None, "parameters": None, "coordinates": "auto", "frozen": False, "inputs": (), "outputs": (),
+    "independent": (),
 }  # fmt: skip
 """Arguments of `linearize` for the stability of an equilibrium."""
 

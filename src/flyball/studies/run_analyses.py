@@ -440,7 +440,7 @@ class LinearAnalysis(SmallMotionAnalysis):
 
     def run(self, model: Model, o: SmallMotionOptions) -> LinearModel:
         """The linear model with the requested inputs and outputs."""
-        return linearize(model, LinearizeOptions(inputs=o.inputs, outputs=o.outputs, **o.there(model)))
+        return linearize(model, LinearizeOptions(inputs=o.inputs, outputs=o.outputs, independent=(), **o.there(model)))
 
     def named(self, model: Model, text: Any) -> StudyQuantity:
         """Gain or phase from an input to an output, or a number of the eigenvalues."""
