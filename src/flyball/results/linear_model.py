@@ -17,6 +17,7 @@ from ..errors import AnalysisError, ModelError, import_optional
 from ..model.model import listing, suggest
 from ..numerics.eigen import QuadraticPencil
 from ..numerics.rank import saddle_point_solver
+from ..numerics.reachability import unreachable_modes
 from .wording import with_unit
 
 if TYPE_CHECKING:
@@ -195,6 +196,7 @@ def _matrix_entries(X: Any) -> dict[str, Any]:
 
 
 MAX_EIGENVALUES = 10  # number of eigenvalues of a large mechanism in a text
+SHOWN_PART = 1e-9  # coefficients of a combination of states, relative to the largest, that are shown
 ROUNDING_PART = 1e-12  # relative to a complex number: smaller real or imaginary parts are rounding
 
 
@@ -354,6 +356,38 @@ class LinearModel:
         dt = 0 if self.period is None else self.period
         return control.ss(self.A, self.B, self.C, self.D, dt, name=_control_name(self.name), **names)
 
+    def uncontrollable_modes(self, *inputs: str) -> list[tuple[complex, dict[str, complex]]]:
+        """Eigenvalues that no input changes, each with the combination of the states that follows no input.
+
+        Constraints and symmetries cause them: the difference of two equal pendulums on one driven cart. Ranks are
+        decided in balanced units by the staircase form (Van Dooren 1981).
+
+        Parameters
+        ----------
+        *inputs : str
+            All inputs if not given.
+
+        Returns
+        -------
+        list of (eigenvalue, {state: coefficient})
+            Of a complex pair the one with positive imaginary part. Empty if the model is controllable.
+        """
+        columns = [self.input_index(name) for name in inputs] or range(len(self.inputs))
+        return self._unreachable(self.A, self.B[:, columns])
+
+    def unobservable_modes(self, *outputs: str) -> list[tuple[complex, dict[str, complex]]]:
+        """Eigenvalues whose motions no output shows, each with that motion; as `uncontrollable_modes`."""
+        rows = [self.output_index(name) for name in outputs] or range(len(self.outputs))
+        return self._unreachable(self.A.T, self.C[rows].T)
+
+    def _unreachable(self, A: np.ndarray, B: np.ndarray) -> list[tuple[complex, dict[str, complex]]]:
+        values, vectors = unreachable_modes(A, B)
+        return [
+            (complex(w), {name: complex(x) for name, x in zip(self.states, v, strict=True) if abs(x) > SHOWN_PART})
+            for w, v in zip(values, vectors.T, strict=True)
+            if w.imag >= 0.0
+        ]
+
     def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
         """Return zeros, poles [1/s] and gain of a transfer function; the only input and output if not named.
 
@@ -457,6 +491,9 @@ class LinearModel:
         if self.period is not None:
             out.append(("period", f"{self.period:.6g} s: eigenvalues are multipliers from one to the next"))
         out += [("eigenvalues", f"{_eigenvalue_text(w)}{unit}") for w in self.eigenvalues if w.imag >= 0.0]
+        for what, missing in (("controllable", self.uncontrollable_modes), ("observable", self.unobservable_modes)):
+            if self.inputs if what == "controllable" else self.outputs:
+                out += [(f"not {what}", f"{_eigenvalue_text(w)}{unit}") for w, _ in missing()]
         if len(self.inputs) == len(self.outputs) == 1:
             zeros, _, gain = self.transfer()
             out += [("zeros", f"{_eigenvalue_text(w)}{unit}") for w in zeros if w.imag >= 0.0]
