@@ -38,6 +38,7 @@ PREPARED = [name for name in EQUATIONS if name != "governor_pi.py"]
 """Those without controllers, whose states `prepare` does not support."""
 PROMISED = {
     "andrews.toml",
+    "bennett.py",
     "bricard.toml",
     "bouncing_ball.toml",
     "cam.py",
@@ -56,7 +57,9 @@ PROMISED = {
     "governor_pi.py",
     "heavy_top.toml",
     "inverted_pendulum.py",
+    "linkages.py",
     "n_four_bar.py",
+    "oldham.toml",
     "peaucellier.toml",
     "pendulum_chain.py",
     "planetary.py",
@@ -78,7 +81,12 @@ PROMISED = {
     "thin_rod.toml",
     "toggle_press.toml",
 }
-REDUNDANT = {"bricard.toml": 1, "planetary.py": 2, "geneva_drive.toml": 1}  # rows that say nothing new, on purpose
+REDUNDANT = {
+    "bennett.py": 3,
+    "bricard.toml": 1,
+    "planetary.py": 2,
+    "geneva_drive.toml": 1,
+}  # rows that say nothing new, on purpose
 WAY = {"cam_follower.toml": 0.01}  # what moves least [m]
 SECONDS = {"governor.toml": 0.2, "andrews.toml": 0.05}  # to be seen of what moves fast; 1 s of the others
 
