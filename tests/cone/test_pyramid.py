@@ -7,6 +7,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
+import flyball as fb
 from flyball.errors import AnalysisError
 from flyball.numerics.complementarity.contact_problem import (
     CONVERGED,
@@ -17,7 +18,7 @@ from flyball.numerics.complementarity.contact_problem import (
 )
 from flyball.numerics.complementarity.friction_pyramid import project_on_polygon, pyramid, pyramid_sliding_friction
 from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
-from flyball.numerics.complementarity.lemke import delassus, lemke, pyramid_by_lemke
+from tests.cone.lemke import delassus, lemke, pyramid_by_lemke
 from tests.cone.problems import dense, random_problem
 
 
@@ -137,3 +138,46 @@ def test_what_it_is_not_made_for_is_left_alone():
     before, O.count.directions = X.v.copy(), 4
     assert solve_contacts(pyramid, P, X, W, O, F) == 0 and O.count.ended == SOLVE_FAILED
     np.testing.assert_array_equal(X.v, before)
+
+
+@pytest.mark.parametrize(("directions", "angle"), [(4, 0.2), (4, 0.6), (4, 0.84), (8, 0.6), (16, 0.3)])
+def test_a_sliding_body_is_braked_along_the_nearest_edge(directions, angle):
+    """In a simulation, relative to mu g: along the velocity, and across it."""
+    c, s = np.cos(angle), np.sin(angle)
+    m = fb.Mechanism("puck", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("ice", shape=fb.Plane()), fb.Contact(friction=0.5))
+    m.add(
+        fb.Body(
+            "b",
+            shape=fb.Sphere(radius=0.1),
+            mass=1,
+            inertia=(1e6,) * 3,
+            position=(0, 0, 0.1),
+            velocity=(2 * c, 2 * s, 0),
+        )
+    )
+    run = m.simulate(0.01, method=fb.Stepping(step=1e-3, solver="pyramid", directions=directions), outputs=2)
+    x, y, _ = (run["b"].velocity[0] - run["b"].velocity[-1]) / (0.01 * 0.5 * 9.81)
+    along, across = pyramid_sliding_friction(directions, angle)
+    assert (c * x + s * y, s * x - c * y) == pytest.approx((along, -across), abs=2e-2)  # it turns a little meanwhile
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"directions": 4}, r"directions of Stepping is for solver='pyramid', not 'auto'"),
+        ({"solver": "pyramid", "directions": 2}, "directions .* 3"),
+        ({"solver": "pyramid", "coulomb": False}, "Coulomb's law on a pyramid"),
+    ],
+)
+def test_options_of_the_pyramid(options, message):
+    with pytest.raises(fb.ModelError, match=message):
+        fb.Stepping(**options)
+
+
+def test_the_pyramid_has_no_rolling_friction():
+    m = fb.Mechanism("ball", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.5, rolling_friction=0.01))
+    m.add(fb.Body("b", shape=fb.Sphere(radius=0.1), density=1000, position=(0, 0, 0.1)))
+    with pytest.raises(fb.ModelError, match="'pyramid' of Stepping has no rolling or spinning friction"):
+        m.simulate(0.1, method=fb.Stepping(solver="pyramid"))

@@ -208,6 +208,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
 
 RESTITUTION_LAWS = ("poisson", "newton", "moreau")
 CONVEX_ONLY_SOLVERS = ("barzilai-borwein",)
+PYRAMID, LEAST_DIRECTIONS, DEFAULT_DIRECTIONS = "pyramid", 3, 8
 IMPACT_ORDERS = ("simultaneous", "sequential")
 
 
@@ -236,6 +237,8 @@ class Stepping:
     tolerance : float [m/s], optional
         Residual of the velocities at which iterations stop; 1e-5 of that speed if not given. In very short steps it is
         a hundredth of the velocity that gravity adds in the step, where that is less.
+    directions : int, optional
+        Number of edges of the friction pyramid of ``solver="pyramid"``, at least 3; 8 if not given.
     coulomb : bool
         Whether to use Coulomb's law. If not, the convex approximation is solved, in which sliding bodies separate by
         friction coefficient times sliding speed times step.
@@ -251,6 +254,7 @@ class Stepping:
     iterations: int | None = None
     position_iterations: int | None = None
     tolerance: float | None = None
+    directions: int | None = None
     coulomb: bool = True
     restitution: str = "poisson"
     impacts: str = "simultaneous"
@@ -280,6 +284,12 @@ class Stepping:
                 "effect; leave one of the two out"
             )
 
+        if self.directions is not None and self.solver != PYRAMID:
+            raise ModelError(f"directions of Stepping is for solver={PYRAMID!r}, not {self.solver!r}; leave it out")
+        if self.directions is not None:
+            require_count(self.directions, "directions", LEAST_DIRECTIONS)
+        if self.solver == PYRAMID and not self.coulomb:
+            raise ModelError(f"solver {PYRAMID!r} of Stepping solves Coulomb's law on a pyramid: leave coulomb out")
         if self.solver in CONVEX_ONLY_SOLVERS and self.coulomb:
             raise ModelError(
                 f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"

@@ -3,8 +3,8 @@
 The solvers use no body data. The contact problem (`contact_problem`) is an operator from impulses to velocities
 (`contact_operator`) with cones of admissible impulses (`cone_projection`). Solvers: `gauss_seidel`, `jacobi`,
 `apgd`, `barzilai_borwein` (first order; they share `packed_contacts` and `gradient_steps`), `newton`, `admm`
-(second order, with a sparse factor; they share `island_rows` and `proximal_rows`), `friction_pyramid` and
-`lemke` (pyramids in place of cones). A new solver is a file with a kernel and a line in
+(second order, with a sparse factor; they share `island_rows` and `proximal_rows`), `friction_pyramid` (pyramids
+in place of cones). A new solver is a file with a kernel and a line in
 `solver_choice.SOLVERS`.
 
 The small dense problem (`dense_problem`, `dense_solver`) decides which rows stick, slide or separate.

@@ -2,7 +2,8 @@
 
 Stewart and Trinkle 1996, Anitescu and Potra 1997: the tangential impulse is a sum of nonnegative impulses in d
 directions, together at most mu p_n, with maximum dissipation. Equivalently, a step against the velocity is projected on
-a regular d-gon. Small problems can be solved by pivoting instead: `lemke`.
+a regular d-gon. The tests solve small
+problems by pivoting instead (Lemke 1965).
 """
 
 from __future__ import annotations

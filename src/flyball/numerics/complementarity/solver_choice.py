@@ -34,6 +34,7 @@ from .contact_problem import (
     allocate_solver,
     empty_problem,
 )
+from .friction_pyramid import pyramid
 from .gauss_seidel import gauss_seidel
 from .jacobi import jacobi
 from .newton import newton
@@ -480,6 +481,7 @@ SOLVERS: dict[str, Kernel] = {
     "apgd": apgd,
     "apgd-lean": scaled_apgd,
     "admm": admm,
+    "pyramid": pyramid,
 }
 FACTORISING_SOLVERS = {
     "newton",

@@ -10,9 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import AnalysisError
-from .contact_operator import apply_contact_impulse, apply_line_impulse, contact_velocity, line_velocity
-from .contact_problem import ContactProblem, ContactSolution
+from flyball.errors import AnalysisError
+from flyball.numerics.complementarity.contact_operator import (
+    apply_contact_impulse,
+    apply_line_impulse,
+    contact_velocity,
+    line_velocity,
+)
+from flyball.numerics.complementarity.contact_problem import ContactProblem, ContactSolution
 
 MAX_UNKNOWNS = 2000  # maximum number of unknowns: takes seconds
 PIVOT_TOLERANCE = 1e-11  # relative to the largest entry of the column; smaller pivots count as zero
