@@ -1337,7 +1337,7 @@ class SymbolicMethods(Model):
         parameters: Mapping[str, float | str] | None = None,
         name: str = "",
     ) -> Code:
-        """Write the equations of motion as code: C, Python that needs NumPy only, CasADi or Numba.
+        """Write the equations of motion as code: C, Python that needs NumPy only, CasADi, Numba, or as an FMU.
 
         Functions are straight-line code of time, state, inputs and parameters, made from the formulas that flyball
         itself uses. `Code` gives the order of their arguments.
@@ -1346,14 +1346,14 @@ class SymbolicMethods(Model):
         ----------
         folder : str or Path, optional
             Folder for the files; no files are written if not given.
-        language : {"c", "python", "casadi", "numba"}
-            C99 with a header, a Python module, functions of CasADi with a module that reads them, or a module of
-            functions that Numba compiles.
+        language : {"c", "python", "casadi", "numba", "fmu", "fmu2"}
+            C99 with a header, a Python module, functions of CasADi with a module that reads them, a module of functions
+            that Numba compiles, or a functional mock-up unit of FMI 3.0 (``fmu``) or 2.0 for other simulators.
         functions : sequence of str
             Functions to write, out of kinematics, velocities, T, M, f, g, nu, G, gamma, residual, right_hand_side,
             energies and, with outputs, outputs; all of them if not given.
         outputs : sequence of str
-            Names of result quantities that the function ``outputs`` returns, such as ``"slider.x"``, ``"A.force_x"``.
+            Names of result quantities that the function ``outputs`` returns, such as ``"slider.x"``, ``"A.fx"``.
         inputs : sequence of str
             As for `linearize`: terms added to laws of forces, motors and drivers; the argument ``u``.
         coordinates : {"auto", "absolute", "joint"}

@@ -49,9 +49,11 @@ from ..math.vec import add, cross, load3, load9, mm, mv
 from ..model.body import Frame
 from ..model.messages import listing, suggest
 from ..model.output_files import make_folder, write_file
+from ..model.quantities import component_names, quantities
 from ..numerics.sparse_factorisation import LDLPattern, analyse_ldl, ldl_factor, ldl_solve
 from ..results.wording import with_unit
 from ..tables.table_definitions import FactorVectors, map_arrays
+from .fmu import archive as fmu
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -493,7 +495,10 @@ def outputs(x: Functions) -> FunctionParts:
     found = [x.equations[name] for name in x.outputs]
     wide = [name for name, e in zip(x.outputs, found, strict=True) if e.shape]
     if wide:
-        raise ModelError(f"the output {wide[0]!r} is no single number: take its components, such as {wide[0] + '_x'!r}")
+        owner, _, what = wide[0].rpartition(".")
+        parts = component_names(quantities(x.equations.model, owner), what)
+        remedy = f": take its components, {', '.join(f'{owner}.{k}' for k in parts)}" if parts else ""
+        raise ModelError(f"the output {wide[0]!r} is no single number{remedy}")
     nodes: list[Any] = [e.nodes[()] for e in found]
     met = {n.index for n in nodes_in_order(nodes) if n.op == SYMBOL}
     if any(
@@ -517,6 +522,7 @@ CALLING_CONVENTIONS = {
     "The other files in this folder contain them.",
     "numba": "Arguments are floats and arrays of floats; one state at a time.",
 }
+CALLING_CONVENTIONS |= dict.fromkeys(fmu.VERSIONS, CALLING_CONVENTIONS["c"])
 
 
 def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> str:
@@ -559,7 +565,7 @@ def argument_constants(eq: Equations, start: Mapping[str, np.ndarray]) -> dict[s
     }
 
 
-LANGUAGES = ("c", "python", "casadi", "numba")
+LANGUAGES = ("c", "python", "casadi", "numba", "fmu", "fmu2")
 
 
 @dataclass(frozen=True)
@@ -571,7 +577,7 @@ class Code:
 
     Attributes
     ----------
-    language : {"c", "python", "casadi", "numba"}
+    language : {"c", "python", "casadi", "numba", "fmu", "fmu2"}
     name : str
         Name of the files, and prefix of names in C.
     texts : dict of str to str
@@ -613,7 +619,8 @@ class Code:
             space: dict[str, Any] = {}
             exec(compile(self.texts[f"{self.name}.py"], f"<{self.name}>", "exec"), space)
             return {r.name: space[r.name] for r in self.routines}
-        raise ModelError("functions in C are called when they are compiled: write them to a folder")
+        what = "an FMU" if self.language in fmu.VERSIONS else "C"
+        raise ModelError(f"functions in {what} are called when they are compiled: write them to a folder")
 
     def __getitem__(self, name: str) -> Any:
         """A function by its name."""
@@ -624,6 +631,10 @@ class Code:
     def written(self, folder: str | Path) -> Code:
         """Write the files to a folder, which is created if missing; returns the code with the file names."""
         folder = make_folder(folder)
+        if self.language in fmu.VERSIONS:
+            path = folder / f"{self.name}.fmu"
+            fmu.pack(self.name, fmu.VERSIONS[self.language], self.texts, path)
+            return replace(self, files=(path,))
         for name, text in self.texts.items():
             write_file(folder / name, text)
         written = [folder / name for name in self.texts]
@@ -668,15 +679,24 @@ def export_equations(
         raise ModelError(f"language={language!r}: must be {', '.join(LANGUAGES)}{suggest(str(language), LANGUAGES)}")
     if isinstance(functions, str) or isinstance(outputs, str):
         raise ModelError("functions and outputs are lists of names")
-    made = Functions(eq, outputs)
+    own = argument_names(eq)
+    states = {*own["q"], *own["v"], *own["z"]} if language in fmu.VERSIONS else set()  # which are variables anyway
+    made = Functions(eq, [name for name in outputs if name not in states])
+    if language in fmu.VERSIONS:
+        if functions:
+            raise ModelError(f"functions= has no effect with language={language!r}, which decides itself; leave it out")
+        functions = [f for f in fmu.FUNCTIONS if f in made.names and (len(made.traced.lam) or f not in fmu.CONSTRAINTS)]
     routines = tuple(made.routine(k) for k in dict.fromkeys(functions or made.names))
     _annotate_functions(eq, routines)
     called = _identifier(name or eq.model.name, language)
     start = _start(eq, made)
     told, top = argument_constants(eq, start), file_header(eq, language, routines)
-    if language == "c":
+    if language == "c" or language in fmu.VERSIONS:
         sources = c_sources(routines, called, top, told)
         texts = {f"{called}.c": sources.source, f"{called}.h": sources.header}
+        if language in fmu.VERSIONS:
+            shown = [(n, "" if n in states else eq[n].unit) for n in outputs]
+            texts = fmu.unit_files(fmu.unit_of(called, eq.model.name, language, routines, start, shown, eq), texts)
     elif language == "casadi":
         for r in routines:
             r.check()
