@@ -13,6 +13,7 @@ USES = {
     "Table": 'fb.Table("profile", x=(0, 0.5, 1), y=(0, 1, 0), interpolation="cubic")',
     # joints, couplings
     "Cam": 'fb.Cam("contact", "cam", "follower", points=[(0.1, 0), (0, 0.12), (-0.1, 0), (0, -0.1)], at=(0, 0.12))',
+    "Constraint": 'fb.Constraint("cam", "slide.displacement - 0.02*(1 - cos(A.angle))")',
     "Coupler": 'fb.Coupler("equal", ("A.angle", "D.angle"), weights=(1, -1))',
     "Cylindrical": 'fb.Cylindrical("B", "crank", "coupler", at=(0, 0, 0), axis=(0, 0, 1))',
     "Distance": 'fb.Distance("link", "crank", "rocker", at=((0, 0.2), (0.5, 0.5)))',

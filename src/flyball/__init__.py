@@ -17,7 +17,7 @@ Describe a mechanism
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
-    couplings     GearPair, RackAndPinion, Coupler
+    couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;

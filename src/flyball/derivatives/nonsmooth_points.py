@@ -231,6 +231,11 @@ def _force_and_driver_functions(
                 [*names.values()],
                 partial(_law_value, law, [*names], known, tables),
             )
+    for coupling in s.model.couplings:
+        law = coupling.equation(s.model)
+        if law is not None and (names := _law_arguments(s.model, law, {}, to)):
+            value = partial(_law_value, law, [*names], known, tables)
+            yield coupling.name, f"{coupling.title}: its law '{law}'", [*names.values()], value
     for k, force in enumerate(s.forces):
         inputs: dict[str, str] = {}
         laws: list[Expression] = []

@@ -51,7 +51,7 @@ ONE_KIND = {
     "events": Event,
 }
 MUTUAL = "controllers"  # categories whose elements may refer to each other
-AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
+AFTER_OTHERS = ("couplings", "sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
 SELF_NAMED = ("material_pairs", "contacts")  # categories with automatic names
 MANY_KINDS = {
     "joints": (Joint, "joints"),

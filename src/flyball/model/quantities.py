@@ -92,8 +92,10 @@ def _quantity_table(model: Model, name: str) -> Table:
     if isinstance(e, Force):
         return _of_force(model, e, axes)
     if isinstance(e, Coupling):
-        units = [_effort(model.unit(text, e)) for text in e.coupled()]
-        return {f"effort_{k}": Quantity(unit, curve=True, array=True) for k, unit in enumerate(units, 1)}
+        units = {f"effort_{k}": _effort(model.unit(text, e)) for k, text in enumerate(e.coupled(), 1)}
+        equation = e.equation(model)
+        units |= {"work": "J"} if equation is not None and "t" in equation.names else {}
+        return {k: Quantity(unit, curve=True, array=True) for k, unit in units.items()}
     if isinstance(e, Driver):
         effort = Quantity(_effort(model.unit(e.coordinate, e)), curve=True, array=True)
         return {"effort": effort, "work": Quantity("J", curve=True, array=True)}

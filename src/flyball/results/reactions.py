@@ -155,9 +155,10 @@ class JointReactions:
             apply_wrench(W, i, effort, neg(force), torque_F, F[0])
 
     def _efforts(self) -> list[np.ndarray]:
-        """Return the effort along every measured quantity: of forces, and of drivers whose laws depend on it.
+        """Return the effort along every measured quantity: of forces, and of rows whose laws depend on it.
 
-        The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier.
+        The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier; that of an
+        equation of a coupling is -f(t, s).
         """
         result, s = self._result, self._result.values.structure
         out = [result.records.zeros() for _ in s.measured]
@@ -167,11 +168,11 @@ class JointReactions:
                 out[m] = out[m] + effort
         for k, row in enumerate(s.rows):
             for slot in row.sensors:
-                out[slot] = out[slot] - result.multipliers[:, k] * self._slope(row.law, slot)
+                out[slot] = out[slot] - result.multipliers[:, k] * self.law_slope(row.law, slot)
         return out
 
-    def _slope(self, law: int, slot: int) -> np.ndarray:
-        """Return the derivative of a driver's law with respect to a sensor."""
+    def law_slope(self, law: int, slot: int) -> np.ndarray:
+        """Return the derivative of a row's law with respect to a sensor."""
         result, S = self._result, self._result.values.system
         sensed = result.measured.slots
         stack = np.zeros((result.values.structure.depth + 1 + STACK_RESERVE, 3), result.records.dtype)
@@ -412,9 +413,9 @@ class ImpulseReactions(JointReactions):
         for k, t in enumerate(s.terms):
             if not t.measured:
                 self._push(out, reacting_element(t).name, k, result.multipliers[:, t.row])
-        for row, x in enumerate(s.rows):  # drivers whose laws depend on measured quantities
+        for row, x in enumerate(s.rows):  # rows whose laws depend on measured quantities
             for slot in x.sensors:
-                self._along(out, x.element.name, slot, -result.multipliers[:, row] * self._slope(x.law, slot))
+                self._along(out, x.element.name, slot, -result.multipliers[:, row] * self.law_slope(x.law, slot))
         for name, (kind, at, impulse, *more) in applied_by_event(self._blows).items():
             if kind == "along":
                 self._along(out, name, at, impulse + result.records.zeros())

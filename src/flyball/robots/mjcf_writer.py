@@ -370,6 +370,8 @@ class _Writer:
         if len(at) < len(c.coupled()):
             other = next(text for text in c.coupled() if self._row_of(text) is None)
             raise ModelError(f"{c.title} has no counterpart in MJCF: {other} is not the coordinate of a hinge or slide")
+        if c.equation(self.model) is not None:
+            raise ModelError(f"{c.title} has no counterpart in MJCF, which has linear relations of coordinates only")
         n = self.numbers[c.name]
         given = c.factors(n, self.model, self.poses.axis)
         factors, c0 = coupling_numbers(c, n, given, self.values.system.bodies.offset[at])

@@ -19,6 +19,7 @@ from ..model.body import GROUND, Driver, Frame
 from ..model.controller import Sensor
 from ..model.element_laws import with_inputs
 from ..model.expressions import parameter_formulas
+from ..model.joint import Coupling
 from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..numerics.integrators.butcher_tableaux import tableau
@@ -48,7 +49,8 @@ def model_with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[s
         raise ModelError(f"the input {repeated[0]!r} is named twice; leave one of them out")
     out, inputs = with_inputs(model, names)
     for x in inputs:
-        driven = [e.title for e, law, _ in element_laws(out) if isinstance(e, Driver) and x.parameter in law.names]
+        laws = ((e, law) for e, law, _ in element_laws(out) if isinstance(e, (Driver, Coupling)))
+        driven = [e.title for e, law in laws if x.parameter in law.names]
         if driven:
             raise ModelError(
                 f"{x.name!r} cannot be an input of a stepper: it sets the position of {driven[0]}, which would jump "

@@ -78,7 +78,9 @@ class ClosureEquations:
         length = c.values.length
         self.scale = c.sizes
         units = {t.row: t.formula.measure for t in s.terms if not t.measured}
-        self.row_scale = np.array([1.0 / length if units[k] == "m" else 1.0 for k in range(len(s.rows))])
+        scales = {"m": 1.0 / length, "rad": 1.0}
+        levers = c.values.system.row_levers.real / length  # of equations of couplings, which have no terms
+        self.row_scale = np.array([scales[units[k]] if k in units else levers[k] for k in range(len(s.rows))])
         self.used = np.r_[np.arange(rows), drive]
         self.turning = bool(s.rows[drive].wrap)
         self.unit = 1.0 if self.turning or units[drive] != "m" else length  # unit of the driver's coordinate

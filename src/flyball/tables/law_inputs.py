@@ -125,7 +125,7 @@ def _reading_terms(s: Structure, e: Element) -> list[int]:
 
 
 def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
-    """Laws of forces, controllers and drivers: (element, law, its inputs besides time)."""
+    """Laws of forces, controllers, couplings and drivers: (element, law, its inputs besides time)."""
     for x in controller_states(model):
         if not x.controller.sampled:
             yield x.controller, x.law, ()
@@ -135,6 +135,9 @@ def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str,
             for law in value if isinstance(value, tuple) else (value,):
                 if law is not None and not isinstance(law, float):
                     yield e, model.law(law, of, f"{name} of {e.title}"), of.inputs
+    for coupling in model.couplings:
+        if (equation := coupling.equation(model)) is not None:
+            yield coupling, equation, ()
     for driver in model.drivers:
         law = LawOf(model.unit(driver.coordinate, driver))
         yield driver, model.law(driver.law, law, f"law of {driver.title}", driver=True), ()

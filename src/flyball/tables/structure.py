@@ -265,7 +265,8 @@ def _built(model: Model, choices: Choices) -> Structure:
         constraint_rows.measure_released_rows(s)
     in_events = constraint_rows.event_names(model) if c.switches else {}
     outputs = {name: model[name] for name in c.outputs}
-    forces.measure_quantities(s, {**outputs, **law_inputs.controller_names(model), **in_events})
+    named = outputs | constraint_rows.coordinates_in_equations(model) | law_inputs.controller_names(model) | in_events
+    forces.measure_quantities(s, named)
     law_inputs.add_controller_slots(s)
     if c.switches:
         law_inputs.number_force_readings(s)

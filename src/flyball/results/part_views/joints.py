@@ -160,7 +160,11 @@ class CouplingView(PartView):
     def effort(self, coordinate: str) -> np.ndarray:
         """Return the force [N] or torque [N m] of the coupling on one of its coordinates, along it."""
         s, S = self._x.structure, self._x.system
-        for k in s.terms_of[self.element.name]:
+        row = s.rows[s.slices[self.element.name].start]
+        if row.law >= 0 and coordinate in self.element.coupled():
+            slope = self._result.reactions.law_slope(row.law, s.slots[coordinate])
+            return -slope * self._result.multipliers[:, s.slices[self.element.name].start]
+        for k in s.terms_of.get(self.element.name, ()):
             t = s.terms[k]
             if f"{t.owner.name}.{t.what}" == coordinate:
                 return self._result.multipliers[:, t.row] * S.term_parameters[k, COEFFICIENT] / t.sign
@@ -168,7 +172,9 @@ class CouplingView(PartView):
         raise ModelError(f"{self.element.title} does not couple {coordinate!r}; it couples {has}")
 
     def _found(self, name: str) -> np.ndarray:
-        """Return ``effort_1``, ``effort_2`` ... on its coordinates, in order."""
+        """Return ``effort_1``, ``effort_2`` ... on its coordinates, in order, or the work of an equation of time."""
+        if name == "work":
+            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.work"]]
         return self.effort(list(self.element.coupled())[int(name.removeprefix("effort_")) - 1])
 
 
