@@ -158,8 +158,8 @@ def trace_equations(
     T = np.array([[0.0] * nv] * s.nq, object).reshape(s.nq, nv)
     _rates(S, q, v, T)
     f = W.velocities.applied
-    inertial_wrenches(S, W)
     update_controllers(S, W, t, z, zdot)
+    inertial_wrenches(S, W, t, zdot)
     apply_forces(S, W, t, zdot)
     gather_forces(S, W, f)
     apply_efforts(S, W, t, zdot, f)
@@ -337,6 +337,9 @@ def joint_efforts(model: Model, e: JointController, moving: bool) -> list[Syntax
     told = {k: number(x, symbols, None, f"parameter {k!r} of {e.title}") for k, x in e.parameters}
     given = symbols | told
     S = values(s, given).system if given else object_tables(values(s).system)
+    now = given | {"t": graph.symbol("t")}
+    laws = zip(S.gravity, robot.gravity_laws(), strict=True)
+    S = S._replace(gravity=np.array([g if law is None else law.evaluate(now) for g, law in laws], object))
     q, v, a = (np.zeros(s.nv, object) for _ in range(3))
     bodies = S.tree.parent.shape[0]
     of_velocity = np.repeat(np.arange(bodies), S.tree.nv)

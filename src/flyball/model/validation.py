@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-RESERVED = (GROUND, "energy", "t", "time")
+RESERVED = (GROUND, "energy", "gravity", "t", "time")
 
 
 def check_name(model: Model, e: Element) -> None:

@@ -245,6 +245,14 @@ def _turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
 Wrench = tuple[tuple, tuple]
 
 
+def gravity_over_time(result: Result) -> tuple[Any, ...]:
+    """Return the components of the acceleration of gravity [m/s^2]: numbers, or over time."""
+    known = {**result.values.env, "t": result.t}
+    laws = result.values.structure.model.gravity_laws()
+    constant = result.values.system.gravity
+    return tuple(g if law is None else law.evaluate(known) for g, law in zip(constant, laws, strict=True))
+
+
 def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRecord, tuple]:
     """Return the records of frames F and M of term k, and the result of its formula.
 

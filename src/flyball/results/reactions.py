@@ -31,6 +31,7 @@ from ..tables.constraint_rows import reacting_element
 from ..tables.table_definitions import Wrenches
 from .motion_record import (
     Wrench,
+    gravity_over_time,
     term_coefficient,
     term_over_time,
     unit_effort_wrench,
@@ -128,7 +129,7 @@ class JointReactions:
         """Return kinematics, and gravity minus the inertia forces of each body."""
         S, records = self._result.values.system, self._result.records
         W = SimpleNamespace(bodies=records.W.bodies, body_wrenches=zero_wrenches(records))
-        gravity = tuple(S.gravity)
+        gravity = gravity_over_time(self._result)
         for b in range(len(S.tree.parent)):
             _, R, w, _, alpha, a = records.body(b)
             store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))

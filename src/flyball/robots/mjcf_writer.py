@@ -105,6 +105,8 @@ class _Writer:
         self.tags: dict[str, ET.Element] = {}  # by body
         self.root = ET.Element("mujoco", model=model.name)
         ET.SubElement(self.root, "compiler", angle="radian", autolimits="true")
+        if any(law is not None for law in model.gravity_laws()):
+            self.missing.append("the change of gravity with time")
         ET.SubElement(self.root, "option", gravity=numbers_text(self.values.system.gravity))
         self.places = self._drawn_joints()
         self.joint_tags: dict[int, ET.Element] = {}  # by row

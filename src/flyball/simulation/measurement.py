@@ -77,7 +77,8 @@ def _refuse_numbers(model: Model, name: str, parameter: str) -> None:
             f"{refusal}{what} depends on it by a number (a mass, a length, a stiffness), and inputs are read by laws "
             "only. Give a force or motor as input, or write the law with a parameter of its own"
         )
-    if not any(parameter in law.names for _, law, _ in element_laws(model)):
+    named = [law for _, law, _ in element_laws(model)] + [law for law in model.gravity_laws() if law is not None]
+    if not any(parameter in law.names for law in named):
         raise ModelError(f"{refusal}no law reads it")
 
 

@@ -647,25 +647,26 @@ def generalised_forces(x: NamedEquations) -> list[tuple[str, np.ndarray]]:
     T = x.traced
     S, W = T.system, T.work
     W = W._replace(body_wrenches=W.body_wrenches.copy())
-    turning = _gathered_forces(S._replace(gravity=np.array([0.0] * 3, object)), W, None)
+    weightless = S._replace(gravity=np.array([0.0] * 3, object), gravity_laws=np.full(4, -1))
+    turning = _gathered_forces(weightless, W, T.t, False)
     out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
-    if any(c != 0.0 for c in S.gravity):
-        out.append(("Weight", _gathered_forces(S, W, None) - turning))
+    if any(c != 0.0 for c in S.gravity) or (S.gravity_laws >= 0).any():
+        out.append(("Weight", _gathered_forces(S, W, T.t, False) - turning))
     for k, e in enumerate(T.structure.forces):
         own = map_arrays(lambda _, x: x[k : k + 1], S.forces)  # noqa: B023
         one = S._replace(forces=own, force_parameters=S.force_parameters[k : k + 1], force_code=S.force_code[k : k + 1])
-        out.append((f"{e.name} ({type(e).__name__})", _gathered_forces(one, W, T.t)))
+        out.append((f"{e.name} ({type(e).__name__})", _gathered_forces(one, W, T.t, True)))
     return [(title, x.cleaned(f)) for title, f in out]
 
 
-def _gathered_forces(S: System, W: Work, t: Any) -> np.ndarray:
-    """Forces along the velocities: of inertia and weight, or of the elements in the tables."""
+def _gathered_forces(S: System, W: Work, t: Any, elements: bool) -> np.ndarray:
+    """Forces along the velocities: of inertia and weight, or of the ``elements`` in the tables."""
     f = np.empty(W.velocities.solved.shape[0], object)
     f[:] = 0.0
     W.body_wrenches[:] = 0.0
     rates = np.zeros(len(S.forces.F) + W.trial.size, object)
-    if t is None:
-        inertial_wrenches(S, W)
+    if not elements:
+        inertial_wrenches(S, W, t, rates)
         gather_forces(S, W, f)
         return f
     apply_forces(S, W, t, rates)

@@ -78,6 +78,13 @@ def add_controller_laws(s: Structure) -> None:
             s.ordered += [(e, ordered, [s.law(input_law(s.model, e, name), ()) for name in ordered])]
 
 
+def add_gravity_laws(s: Structure) -> None:
+    """Compile the components of gravity that are laws of time, and number the state of the work of their changes."""
+    laws = [-1 if law is None else s.law(law, ()) for law in s.model.gravity_laws()]
+    work = s.state("gravity.work") if max(laws) >= 0 and not s.far else -1
+    s.tables["gravity_laws"] = np.array([*laws, work], np.int64)
+
+
 def initial_controller_states(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
     """Initial values of the controller states; ``numbers`` are those of elements, by name."""
     found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}

@@ -276,6 +276,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     forces.fill_force_table(s)
     forces.place_rotors(s)
     law_inputs.add_controller_laws(s)
+    law_inputs.add_gravity_laws(s)
     if c.switches:
         constraint_rows.add_event_guards(s)
     constraint_rows.fill_switch_tables(s)

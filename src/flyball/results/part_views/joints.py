@@ -14,7 +14,7 @@ from ...model.body import GROUND
 from ...model.controller_signals import signal_law
 from ...model.messages import listing, suggest
 from ...tables.forest import coordinate_row
-from ..motion_record import FULL_TURN, Wrench, measured_coordinate
+from ..motion_record import FULL_TURN, Wrench, gravity_over_time, measured_coordinate
 from .base import PartView, components_array
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ class IMUView(PartView):
     def specific_force(self) -> np.ndarray:
         """Acceleration of its origin minus gravity, along its own axes [m/s^2], (n, 3)."""
         _, R, _, _, _, a = self._axes()
-        gravity = tuple(self._x.system.gravity)
+        gravity = gravity_over_time(self._result)
         return np.stack(mtv(R, sub(a, gravity)), axis=1)
 
     @property
