@@ -435,7 +435,7 @@ def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[s
     """Return the values that drivers' laws prescribe at time t, as far as they depend on time alone."""
     out = {}
     model = model.snapshot()
-    tables = {x.name: x for x in model.tables}
+    tables = model.law_tables()
     laws = model.cache.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
     for d in model.drivers:
         law = laws[d.name]

@@ -264,7 +264,7 @@ def _known_values(e: EquationDerivatives) -> tuple[dict[str, complex], dict]:
     """Parameters and time, and the tables of the model, by name."""
     model = e.state.c.structure.model
     known = {name: complex(value) for name, value in model.environment(e.state.c.parameters).items()}
-    return known | {"t": complex(e.state.t)}, {x.name: x for x in model.tables}
+    return known | {"t": complex(e.state.t)}, model.law_tables()
 
 
 def _controller_functions(

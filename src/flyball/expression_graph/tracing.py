@@ -205,10 +205,10 @@ def tables_by_name(s: Structure, S: System) -> dict[int, str]:
     """Names of tables by start index in the table of constants; curves of joints are tables of x and y."""
     found = {at: name for name, at in s.table_at.items()}
     for k, t in enumerate(s.terms):
-        if t.formula.of_kind.place:
+        if t.formula.of_kind.splines:
             found |= {
-                int(S.term_parameters[k, 1].real): f"{t.element.name}.x",
-                int(S.term_parameters[k, 2].real): f"{t.element.name}.y",
+                int(S.term_parameters[k, 1].real): f"{(t.owner or t.element).name}.x",
+                int(S.term_parameters[k, 2].real): f"{(t.owner or t.element).name}.y",
             }
     return found
 
@@ -486,7 +486,8 @@ def time_derivative(tree: SyntaxNode, model: Model, where: str, given: str) -> S
         If the law reads something else, or calls a Python function or a table with jumps of the slope.
     """
     parameters = model.environment()
-    smooth = {x.name for x in model.tables if x.interpolation != "linear"}
+    tables = model.law_tables()
+    smooth = {x.name for x in tables.values() if x.interpolation != "linear"}
     for n in tree.walk():
         unknown = n.kind == "name" and n.value not in {"t", *parameters}
         if unknown or n.kind in ("function", "called") or (n.kind == "table" and called_table(n)[0] not in smooth):
@@ -496,7 +497,7 @@ def time_derivative(tree: SyntaxNode, model: Model, where: str, given: str) -> S
     t = graph.symbol("t")
     known: dict[str, Any] = {k: graph.symbol(k, x) for k, x in parameters.items()}
     law = Expression("", tree)
-    curves: Any = {name: _Curve(model[name]) for name in law.tables}
+    curves: Any = {name: _Curve(tables[name]) for name in law.tables}
     value = law.evaluate({**known, "t": t}, curves)
     return law_tree(directional_derivatives([value], [(t, 1.0)])[0])
 

@@ -22,12 +22,14 @@ from .coupler import Coupler as Coupler
 from .cylindrical import Cylindrical as Cylindrical
 from .distance import Distance as Distance
 from .fixed import Fixed as Fixed
+from .flat_faced_cam import FlatFacedCam as FlatFacedCam
 from .gear_pair import GearPair as GearPair
 from .general_universal import GeneralUniversal as GeneralUniversal
 from .knife_edge import KnifeEdge as KnifeEdge
 from .orientation import Orientation as Orientation
 from .planar import Planar as Planar
 from .point_in_plane import PointInPlane as PointInPlane
+from .point_on_curve import PointOnCurve as PointOnCurve
 from .point_on_line import PinInSlot as PinInSlot
 from .point_on_line import PointOnLine as PointOnLine
 from .prismatic import Prismatic as Prismatic

@@ -35,6 +35,7 @@ from .snapshot import (
     snapshot,
 )
 from .table import Table
+from .table_2d import Table2D
 from .units import same_kind
 from .validation import check_kind, check_name, check_references, check_vectors, checked_law, gravity_as_written
 
@@ -73,7 +74,7 @@ class Model:
         self.frames: list[Frame] = []
         self.joints: list[Joint] = []
         self.couplings: list[Coupling] = []
-        self.tables: list[Table] = []
+        self.tables: list[Table | Table2D] = []
         self.sensors: list[Sensor | IMU] = []
         self.controllers: list[Controller] = []
         self.forces: list[Force] = []
@@ -373,6 +374,10 @@ class Model:
         If ``whole``, signals of controllers are replaced by their formulas.
         """
         return checked_law(self, value, of, where, driver, whole)
+
+    def law_tables(self) -> dict[str, Table]:
+        """Return all tables of one argument by name: also those that tables of two arguments are composed of."""
+        return {name: table for x in self.tables for name, table in x.curves().items()}
 
     def names_in_laws(self, of: LawOf) -> set[str]:
         """Return all names that such a law may use; also curves, if it may use these."""

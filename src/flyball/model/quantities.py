@@ -237,7 +237,7 @@ def _of_joint(e: Joint, axes: str) -> Table:
             out |= {"rate": Quantity(rate.unit, f"{what}_rate", curve=True)}
             out |= {"acceleration": Quantity(second.unit, f"{what}_acceleration")}
         out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
-    if hasattr(e, "nearest"):
+    if hasattr(e, "nearest") and "position" not in own:
         out["place"] = Quantity("m", curve=True)
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
 

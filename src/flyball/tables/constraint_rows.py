@@ -156,6 +156,8 @@ def coordinate_term(
     term = TermSpec(row, F, M, c.row, c.sign, e, owner, what, measured)
     if c.row.of_kind.turns and (with_turns or measured):
         term.hint = turn_state(s, owner, what, F, M)
+    elif c.row.of_kind.place:
+        term.hint = s.state(f"{owner.name}.place")
     s.terms.append(term)
     return term
 

@@ -177,7 +177,7 @@ def steep_law_names(model: Model) -> list[str]:
 
 def _is_nonsmooth(model: Model, law: Expression) -> bool:
     """Whether a law has a nonsmooth point that needs a guard; tables with a smooth interpolation do not."""
-    smooth = {x.name for x in model.tables if not len(table_corners(np.array(x.data()), 0))}
+    smooth = {x.name for x in model.law_tables().values() if not len(table_corners(np.array(x.data()), 0))}
     if not law.tables or any(n.kind in _NONSMOOTH for n in law.tree.walk()):
         return True
     return bool(law.tables - smooth)
@@ -236,7 +236,7 @@ class NonsmoothPoints:
 
     def knot_guard_table(self, name: str) -> list[float] | None:
         """Table that is zero at each knot of another table, and only there; None if that has no such knots."""
-        table = next(x for x in self.s.model.tables if x.name == name)
+        table = self.s.model.law_tables()[name]
         data = np.array(table.data())
         x = table_corners(data, 0)
         if not len(x):

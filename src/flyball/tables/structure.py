@@ -252,7 +252,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     c = choices
     s = Structure(model, c.far, c.tree, c.positions or c.far, c.coupled)
     s.const = [0.0] * len(model.parameters)
-    for table in model.tables:
+    for table in model.law_tables().values():
         s.table_at[table.name] = len(s.const)
         s.const += table.data()
     law_inputs.add_controller_states(s)

@@ -311,7 +311,7 @@ def _equation_unit(s: Structure, law: Expression, length: Any, pose: Poses) -> f
     It is linearised in the reference configuration; where all derivatives are 0 there, half a unit beside it.
     """
     env: dict[str, Any] = {name: x.real for name, x in pose.env.items()}
-    tables = {x.name: x for x in s.model.tables}
+    tables = s.model.law_tables()
     units: dict[str, float] = {}
     for t in s.terms:
         name = f"{t.owner.name}.{t.what}" if t.measured and t.owner is not None else ""
@@ -386,11 +386,13 @@ def _term_parameters(
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
         n = numbers[e.name]
+        if t.formula.of_kind.splines and t.owner is not None:
+            x[k, 1:3] = curve_at[t.owner.name], curve_at[t.owner.name] + len(t.owner.curves(numbers[t.owner.name])[0])
         if t.hint >= 0 and t.formula.of_kind.turns:
             x[k, 0] = 1.0
         if isinstance(e, Joint) and t.owner is None:
             x[k, :7] = e.row_parameters(n, t.formula, *pose.ends(e))
-            if t.formula.of_kind.place:
+            if t.formula.of_kind.splines:
                 at = curve_at[e.name]
                 x[k, 1:3] = at, at + len(e.curves(n)[0])
         elif isinstance(e, Joint):

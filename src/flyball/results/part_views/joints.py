@@ -14,7 +14,7 @@ from ...model.body import GROUND
 from ...model.controller_signals import signal_law
 from ...model.messages import listing, suggest
 from ...tables.forest import coordinate_row
-from ..motion_record import FULL_TURN, Wrench, gravity_over_time, measured_coordinate
+from ..motion_record import FULL_TURN, Wrench, curve_places, gravity_over_time, measured_coordinate
 from .base import PartView, components_array
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ class JointView(PartView):
         """Return a coordinate, its rate and, if ``solved``, its acceleration, by the row that measures it."""
         e = self.element
         records = self._result.records if solved else self._result.motions
-        turns = self._turns(what) if e.coordinates[what].row.of_kind.turns else None
+        kind = e.coordinates[what].row.of_kind
+        turns = curve_places(self._result, e) if kind.place else self._turns(what) if kind.turns else None
         value, rate, second = measured_coordinate(records, e, what, turns)
         return value + e.offset(self._x.numbers[e.name], what), rate, second
 
@@ -191,7 +192,7 @@ class ControllerView(PartView):
         sensed = self._result.measured.slots
         env: dict[str, Any] = {"t": self._result.t, **self._x.env}
         env |= {k: sensed[0, m] for k, m in s.slots.items()}
-        return law.evaluate(env, {x.name: x for x in s.model.tables}) + self._result.records.zeros()
+        return law.evaluate(env, s.model.law_tables()) + self._result.records.zeros()
 
 
 class SensorView(PartView):
