@@ -10,13 +10,19 @@ USES = {
     "IMU": 'fb.IMU("imu", "crank")',
     "Initial": 'fb.Initial("A.angle", value="30 deg", rate=0)',
     "Sensor": 'fb.Sensor("height", "tip.y")',
+    "Table2D": 'fb.Table2D("torque", x=(0, 100, 200), y=(0, 1), z=[(0, 50), (0, 60), (0, 40)], interpolation="linear")',
     "Table": 'fb.Table("profile", x=(0, 0.5, 1), y=(0, 1, 0), interpolation="cubic")',
     # joints, couplings
     "Cam": 'fb.Cam("contact", "cam", "follower", points=[(0.1, 0), (0, 0.12), (-0.1, 0), (0, -0.1)], at=(0, 0.12))',
+    "Constraint": 'fb.Constraint("cam", "slide.displacement - 0.02*(1 - cos(A.angle))")',
     "Coupler": 'fb.Coupler("equal", ("A.angle", "D.angle"), weights=(1, -1))',
     "Cylindrical": 'fb.Cylindrical("B", "crank", "coupler", at=(0, 0, 0), axis=(0, 0, 1))',
     "Distance": 'fb.Distance("link", "crank", "rocker", at=((0, 0.2), (0.5, 0.5)))',
     "Fixed": 'fb.Fixed("weld", "arm", "tool", at=(0.4, 0))',
+    "FlatFacedCam": (
+        'fb.FlatFacedCam("tappet", "cam", "follower", points=[(0.1, 0), (0, 0.12), (-0.1, 0), (0, -0.1)], '
+        "at=(0, 0.12), normal=(0, 1))"
+    ),
     "GearPair": 'fb.GearPair("mesh", "A", "B", teeth=(20, 60))',
     "GeneralUniversal": (
         'fb.GeneralUniversal("link", "shaft", "fork", at=((0, 0, 0), (0.1, 0, 0)), axes=((1, 0, 0), (0, 1, 0.2)))'
@@ -26,6 +32,10 @@ USES = {
     "PinInSlot": 'fb.PinInSlot("slot", "lever", "block", at=(0, 0.3), axis=(0, 1))',
     "Planar": 'fb.Planar("table", "ground", "puck", at=(0, 0, 0), axis=(0, 0, 1))',
     "PointInPlane": 'fb.PointInPlane("rest", "ground", "foot", at=(0, 0, 0), axis=(0, 0, 1))',
+    "PointOnCurve": (
+        'fb.PointOnCurve("wire", "ground", "bead", at=(0.4, 0, 0), formulas=("0.4*cos(u)", "0.4*sin(u)", "-0.02*u"), '
+        "interval=(0, '8*pi'))"
+    ),
     "PointOnLine": 'fb.PointOnLine("guide", "ground", "rod", at=(0.3, 0), axis=(1, 0))',
     "Prismatic": 'fb.Prismatic("slide", "ground", "cart", at=(0, 0), axis=(1, 0))',
     "RackAndPinion": 'fb.RackAndPinion("rack", "rack_slide", "pinion_hinge", radius=0.05)',

@@ -15,14 +15,15 @@ Describe a mechanism
                   rigid or elastic, as Rope is; Detent (a force) has notches
     Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
-                  Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
-                  RollingDisk, RollingBall, KnifeEdge
-    couplings     GearPair, RackAndPinion, Coupler
+                  Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, PointOnCurve, Cam,
+                  FlatFacedCam, WheelOnLine, RollingDisk, RollingBall, KnifeEdge
+    couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
-    Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
+    Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,
+                  Table2D a surface
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file, a robot in urdf; ``m.save(path)`` writes one
 
@@ -148,6 +149,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.event import Stop as Stop
     from .model.shapes import *
     from .model.table import Table as Table
+    from .model.table_2d import Table2D as Table2D
     from .results.comparison import Comparison as Comparison
     from .results.differences import Differences as Differences
     from .results.equilibrium import Equilibrium as Equilibrium
@@ -206,6 +208,7 @@ _HOME = {
     "Sensor": "model.controller",
     "IMU": "model.controller",
     "Table": "model.table",
+    "Table2D": "model.table_2d",
     "load": "mechanism",
     "ModelWarning": "errors",
     "PerformanceNotice": "errors",

@@ -37,7 +37,9 @@ class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, S
     planar : bool
         Whether everything moves in the x-y plane (three velocities a body) or in space (six).
     gravity : vector [m/s^2]
-        Acceleration of gravity in world axes; none if not given.
+        Acceleration of gravity in world axes; none if not given. A component may be a law of ``t`` and parameters,
+        ``"-9.81*(1 + 0.1*sin(t))"``: a field that changes, or the motion of a base to which the world is fixed.
+        Potential energy is that of gravity at t = 0, the work of its change is ``run.energy.work["gravity"]``.
     parameters : dict
         Named numbers, usable in every expression of the mechanism.
     """

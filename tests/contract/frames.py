@@ -13,6 +13,7 @@ from flyball.constraints import (
     curve,
     displacement,
     distance,
+    flat_face,
     inclination,
     knife_edge,
     perpendicular,
@@ -20,15 +21,25 @@ from flyball.constraints import (
     rolling,
     rotation_component,
     skew_lines,
+    space_curve,
 )
 from flyball.constraints.registry import KINDS
+from flyball.joints.flat_faced_cam import support_function
+from flyball.joints.point_on_curve import space_curve_splines
 from flyball.model.element import resolve
 from flyball.testing.formula_checks import frame_record, random_motion, turned_frame
 
 OVAL = [(2.0 * np.cos(u), 1.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
 PROFILE = fb.Cam("c", "a", "b", points=OVAL, axis=(0, 0, 1))
 SPLINES = PROFILE.curves(resolve(PROFILE, {}))
-DATA = np.concatenate(SPLINES)
+KNOT = [
+    (2.0 * np.cos(u), 1.2 * np.sin(u), 0.5 * np.sin(2 * u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+]
+WIRE = space_curve_splines(tuple(KNOT), True)[1]
+EXTENT = support_function(tuple(OVAL))
+DATA = np.concatenate([*SPLINES, *WIRE, EXTENT])
+WIRE_AT = sum(map(len, SPLINES))
+EXTENT_AT = float(WIRE_AT + sum(map(len, WIRE)))
 
 ASSEMBLY = (alignment.KIND_AXIS, alignment.KIND_FULL)  # stand-ins while a joint is far from closed: no motion
 AXES = (0.36, 0.48, 0.8, 0.6, 0.0, -0.8, 0.3, 1.0)  # two unit axes; a constant; the coefficient, which no row reads
@@ -43,6 +54,11 @@ PARAMETERS = {
         "outside": (0.0, 0.0, len(SPLINES[0]), 1.0, 0.0, 0.0, 0.3, 1.0),
         "inside": (0.0, 0.0, len(SPLINES[0]), -1.0, 0.0, 0.0, 0.1, 1.0),
     },
+    space_curve.KIND: {
+        name: (which, WIRE_AT, WIRE_AT + len(WIRE[0]), 0.0, 0.0, 0.0, 2.8 * (which == 0.0), 1.0)
+        for name, which in (("position", 0.0), ("first across", 1.0), ("second across", 2.0))
+    },
+    flat_face.KIND: {"": (0.0, EXTENT_AT, 0.0, 0.0, 0.0, 0.0, 0.3, 1.0)},
     rolling.KIND: {
         "height of a disk": (0.0, 0.0, 1.0, 0.5, 0.0, 1.0, 0.3, 1.0),
         "height of a wheel": (0.0, 0.0, 1.0, 0.5, 0.2, 1.0, 0.3, 1.0),
@@ -85,6 +101,10 @@ def frames(case, seed: int) -> tuple[dict, dict, float]:
         x, _, _, y, _, _ = curve.point(PARAMETERS[curve.KIND][case[1]], s, DATA)
         p = F["R"].T @ (M["p"] - F["p"])
         hint = s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)]
+    if case[0] == space_curve.KIND:  # on the curve: the rows are exact to second order there only
+        par = PARAMETERS[space_curve.KIND][case[1]]
+        hint = 2.0 + seed
+        M["p"] = F["p"] + F["R"] @ space_curve.vector(par, 0, hint, DATA)[0]
     return F, M, hint
 
 

@@ -48,6 +48,7 @@ def everything():
     m.add(fb.GearPair("gears", joint_1="B", joint_2="C", teeth=(20, 30)))
     m.add(fb.RackAndPinion("rack", rack="D", pinion="E", radius=0.1))
     m.add(fb.Coupler("sum", coordinates=("A.angle", "B.displacement", "tip.z"), weights=(0.5, 1.0, 0.7)))
+    m.add(fb.Constraint("bent", "A.angle*C.angle - 0.3*e.yaw**2 - 0.1*tip.z - 0.02*sin(t)"))
     m.add(fb.Actuator("actuator", coordinate="D.displacement", force="3*sin(t) - c*rate + 0.1*speed"))
     m.add(fb.Detent("notches", "C.angle", pitch="40 deg", holding="0.4 N*m", notch=0.1, damping=0.02))
     m.add(fb.Limit("soft", "E.angle", lower=0.05, upper=0.1, stiffness=30.0, damping=0.3))

@@ -18,6 +18,7 @@ ACROSS = (2.0, 1.0, 2.0)  # square to AXIS
 SKEW = (0.3, 1.0, 0.4)
 NORMAL = triad(np.array(AXIS) / 3.0)  # axes with AXIS as z
 ELLIPSE = [(0.3 * np.cos(u), 0.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)]
+LOOP = [(x, y, 0.1 * np.sin(4.0 * np.pi * k / 24)) for k, (x, y) in enumerate(ELLIPSE)]
 
 JOINTS = [c for c in Joint.registry.values() if issubclass(c, Joint) and c.__module__.startswith(f"{room.__name__}.")]
 
@@ -26,11 +27,19 @@ SPATIAL = {
     "Cylindrical": {"at": P, "axis": AXIS, "angle": 0.3, "displacement": -0.2},
     "Distance": {"at": (P, Q)},
     "Fixed": {"at": P},
+    "FlatFacedCam": {
+        "points": ELLIPSE,
+        "centre": P,
+        "axis": AXIS,
+        "at": tuple(P + NORMAL @ (0.3, 0.02, 0.05)),
+        "normal": tuple(NORMAL[:, 0]),
+    },
     "GeneralUniversal": {"at": (P, Q), "axes": (AXIS, SKEW)},
     "KnifeEdge": {"at": P, "axis": AXIS, "normal": SKEW},
     "Orientation": {"at": P},
     "Planar": {"at": P, "axis": AXIS, "angle": -0.4},
     "PointInPlane": {"at": P, "axis": AXIS},
+    "PointOnCurve": {"points": LOOP, "centre": P, "at": (P[0] + 0.3, P[1], P[2]), "closed": True},
     "PointOnLine": {"at": P, "axis": AXIS, "displacement": 0.1},
     "Prismatic": {"at": P, "axis": AXIS, "displacement": 0.2},
     "Revolute": {"at": P, "axis": AXIS, "angle": 2.0},
@@ -45,9 +54,11 @@ PLANAR = {
     "Cam": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.33, P[1]), "radius": 0.03},
     "Distance": {"at": (P[:2], Q[:2])},
     "Fixed": {"at": P[:2]},
+    "FlatFacedCam": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.3, P[1] + 0.05), "normal": (1.0, 0.0)},
     "KnifeEdge": {"at": P[:2], "axis": (1.0, 2.0)},
     "Orientation": {"at": P[:2]},
     "PinInSlot": {"at": P[:2], "axis": (1.0, 2.0), "angle": 0.3},
+    "PointOnCurve": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.3, P[1]), "closed": True},
     "PointOnLine": {"at": P[:2], "axis": (1.0, 2.0)},
     "Prismatic": {"at": P[:2], "axis": (1.0, 2.0), "displacement": 0.2},
     "Revolute": {"at": P[:2], "angle": 2.0},
@@ -65,11 +76,13 @@ REMOVED = {
         "Cylindrical": 4,
         "Distance": 1,
         "Fixed": 6,
+        "FlatFacedCam": 1,
         "GeneralUniversal": 4,
         "KnifeEdge": 1,
         "Orientation": 3,
         "Planar": 3,
         "PointInPlane": 1,
+        "PointOnCurve": 2,
         "PointOnLine": 2,
         "Prismatic": 5,
         "Revolute": 5,
@@ -83,9 +96,11 @@ REMOVED = {
         "Cam": 1,
         "Distance": 1,
         "Fixed": 3,
+        "FlatFacedCam": 1,
         "KnifeEdge": 1,
         "Orientation": 1,
         "PinInSlot": 1,
+        "PointOnCurve": 1,
         "PointOnLine": 1,
         "Prismatic": 2,
         "Revolute": 2,

@@ -79,7 +79,7 @@ def test_materials(fields, message):
         (lambda: fb.Ground("wall", shape=fb.Plane(normal=(0, 0, 0))), r"has no length"),
         (lambda: fb.Limit("stop", "floor.angle", lower=0), r"there is no joint named 'floor'"),
         (lambda: fb.Limit("stop", "ball.x"), r"it stops nothing"),
-        (lambda: fb.Limit("stop", "ball.x", lower=1, upper=0), r"lower is 1 m; it must be less than upper, 0 m"),
+        (lambda: fb.Limit("stop", "ball.x", lower=1, upper=0), r"lower is 1 m; it must not be greater than upper, 0 m"),
         (lambda: fb.Limit("stop", "ball.x", lower="1 deg"), r"lower of Limit 'stop'(?s:.*)deg"),
         (lambda: fb.Limit("stop", "ball.x", lower=1, restitution=2), r"restitution is 2; it must be from 0 to 1"),
     ],

@@ -137,7 +137,7 @@ PLANAR = {
     "Bushing on itself": ({**AT2, "body_j": "eye"}, "both its ends are on 'arm'; it must join two different bodies"),
     # what is one-sided
     "Limit of nothing": ({"lower": None}, "it stops nothing; give lower=..., upper=... or both"),
-    "Limit swapped": ({"upper": -1}, "lower is 0 rad; it must be less than upper, -1 rad"),
+    "Limit swapped": ({"upper": -1}, "lower is 0 rad; it must not be greater than upper, -1 rad"),
     "Limit unit": ({"lower": "1 mm"}, "lower of.*'1 mm': expected an angle"),
     "Limit restitution": ({"restitution": -0.1}, "restitution is -0.1; it must be zero or greater"),
     "Limit soft": ({"stiffness": 0}, "stiffness is 0; it must be greater than 0. Leave it out for a rigid one"),

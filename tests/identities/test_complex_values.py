@@ -143,6 +143,7 @@ def with_couplings():
     m.add(fb.RackAndPinion("rack", "C", "A", radius=0.05))
     m.add(fb.Coupler("sum", ("A.angle", "B.angle", "c.x"), weights=(2.0, -1.0, 3.0), value=0.7))
     m.add(fb.Coupler("kept", ("B.angle", "C.displacement", "b.y"), weights=(2.0, -1.0, 3.0)))
+    m.add(fb.Constraint("bent", "A.angle*B.angle - 0.3*c.x + C.displacement**2"))
     return m
 
 

@@ -71,6 +71,7 @@ PARTS = {
     "coupler": lambda: [
         fb.Coupler("k", coordinates=("H0.angle", "H1.angle", "J.displacement", "tip.x"), weights=(1, 2, 3, 4))
     ],
+    "constraint": lambda: [fb.Constraint("c", "sin(H0.angle)*J.displacement - tip.x**2 + 0.1*cos(2*t)")],
     "gears": lambda: [fb.GearPair("g", joint_1="H1", joint_2="J", teeth=(3, 2))],
     "rack": lambda: [fb.RackAndPinion("r", rack="J", pinion="H0", radius=0.2)],
     "driver by sensors": lambda: [

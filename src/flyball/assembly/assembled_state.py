@@ -20,7 +20,7 @@ from ..model.body import Body, Driver, Frame
 from ..model.element import LawOf
 from ..model.expressions import Expression, number
 from ..model.geometry import quaternion_to_matrix, rotation_about
-from ..model.joint import Joint
+from ..model.joint import Coupling, Joint
 from ..model.model import Model
 from ..results.health import InitialDeviation
 from ..results.wording import tuple_text
@@ -65,7 +65,7 @@ def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
         if len(part) and not np.abs(part / c.row_units[rows]).max() < NEGLIGIBLE_GAP:
             gaps[element] = float(np.linalg.norm(part[metric])), float(np.linalg.norm(part[~metric]))
     worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / length, gaps[k][1]))
-    shown = "; ".join(f"{k} is {_gap_text(*gaps[k], length)} from closed" for k in worst[:MAX_LISTED])
+    shown = "; ".join(f"{k} {_gap_text(c, k, *gaps[k])}" for k in worst[:MAX_LISTED])
     return AssemblyError(
         f"{name!r} cannot be assembled at t = {t:g} s: no position fulfils all constraints. At the best position found "
         f"{shown or 'rows disagree'}. Check lengths and the points of these joints, the drivers, and initial values, "
@@ -118,12 +118,14 @@ def _angle_to_singular(t: Any, F: tuple, M: tuple) -> float:
     return float(np.linalg.norm(np.cross(f[:, 2], m[:, 2]))) if isinstance(t.element, Driver) else np.inf
 
 
-def _gap_text(metres: float, radians: float, length: float) -> str:
+def _gap_text(c: CompiledMechanism, name: str, metres: float, radians: float) -> str:
+    if isinstance(e := c.structure.model.find(name), Coupling) and e.equation(c.structure.model) is not None:
+        return f"has the value {radians:.4g} in place of 0"
     parts = [
-        f"{metres:.4g} m" if metres > NEGLIGIBLE_GAP * length else "",
+        f"{metres:.4g} m" if metres > NEGLIGIBLE_GAP * c.values.length else "",
         f"{np.degrees(radians):.4g} deg" if radians > NEGLIGIBLE_GAP else "",
     ]
-    return " and ".join(x for x in parts if x)
+    return f"is {' and '.join(x for x in parts if x)} from closed"
 
 
 def undefined_rate_error(c: CompiledMechanism, t: float) -> AssemblyError | None:
@@ -433,7 +435,7 @@ def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[s
     """Return the values that drivers' laws prescribe at time t, as far as they depend on time alone."""
     out = {}
     model = model.snapshot()
-    tables = {x.name: x for x in model.tables}
+    tables = model.law_tables()
     laws = model.cache.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
     for d in model.drivers:
         law = laws[d.name]

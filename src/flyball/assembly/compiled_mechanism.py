@@ -156,7 +156,8 @@ class CompiledMechanism:
             if t.formula.of_kind.place:
                 p, R = self.work.frames.position, self.work.frames.rotation.reshape(-1, 3, 3)
                 F, M = ((p[k], R[k]) for k in (t.F, t.M))
-                self.z[t.hint] = t.element.nearest(self.values.numbers[t.element.name], F, M)[0]  # type: ignore[attr-defined]
+                e: Any = t.element if t.owner is None else t.owner
+                self.z[t.hint] = e.nearest(self.values.numbers[e.name], F, M)[0]
 
     @property
     def hints(self) -> dict[str, float]:

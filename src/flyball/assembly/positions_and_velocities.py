@@ -350,7 +350,7 @@ def gauss_newton(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -
     damping, wider, capped = 0.0, 1.0, 0
     norm = float(g @ g)
     for k in range(MAX_ITERATIONS):
-        if size < 1e-13:
+        if size < 1e-13 or not np.isfinite(size):
             return q, k
         c.at(t, q, v)
         d = _damped_step(c, -g, scale, root, damping)
@@ -400,7 +400,7 @@ def close_from_far(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray)
         if gap < 1e-9:
             # closed from a perturbed start
             return trial, count
-        if gap < least:
+        if gap < least or not np.isfinite(least):
             best, least = trial, gap
     return best, count
 

@@ -17,6 +17,7 @@ from . import (
     curve,
     displacement,
     distance,
+    flat_face,
     inclination,
     knife_edge,
     perpendicular,
@@ -24,6 +25,7 @@ from . import (
     rolling,
     rotation_component,
     skew_lines,
+    space_curve,
 )
 from .registry import BY_ADDRESS, KINDS, Kind
 
@@ -178,6 +180,18 @@ IN_PLANE = _row(displacement.KIND, "z")
 
 CURVE = Row(curve.KIND, (0.0,) * 7 + (1.0,), "xy")
 """The origin of M stays at a constant distance from a curve in F's x-y plane."""
+
+
+FLAT_FACE = Row(flat_face.KIND, (0.0,) * 7 + (1.0,), "xy")
+"""The plane through M's origin across M's x axis touches a convex profile in F's x-y plane."""
+
+ACROSS_CURVE = tuple(
+    Row(space_curve.KIND, (which, *(0.0,) * 6, 1.0), axes) for which, axes in ((1.0, "xy"), (2.0, "z"))
+)
+"""The origin of M stays on a curve in F."""
+
+ALONG_CURVE = Row(space_curve.KIND, (0.0,) * 7 + (1.0,))
+"""Coordinate: position of M's origin along a curve in F, its arc length."""
 
 
 def shift(axis: str) -> Row:

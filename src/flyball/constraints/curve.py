@@ -34,6 +34,15 @@ def point(par, s, data):
 
 
 @formula
+def offset(par, F, M, s, data):
+    """Return the vector from the curve point at s to M's origin, in F's x-y plane, and the derivative c'."""
+    x, x1, _, y, y1, _ = point(par, s, data)
+    p = mtv(F[1], sub(M[0], F[0]))
+    o = 0.0 * x
+    return (p[0] - x, p[1] - y, o), (x1, y1, o)
+
+
+@formula
 def foot(par, F, M, hint, data):
     """The parameter of the curve point nearest to M's origin by Newton's method from ``hint``: (p - c).c' = 0."""
     p = mtv(F[1], sub(M[0], F[0]))

@@ -6,8 +6,10 @@ A file defines ``KIND``, its number (or ``ROWS``, several numbers and their form
 - ``TURNS = True``: its value is an angle, of which full turns are counted (if parameter 0 says so);
 - ``POINTS``: the frames, ``"F"``, ``"M"`` or both, of which it reads the origin only and on which it makes no torque;
 - ``SINGLE = True``: its formula branches on its numbers, so results evaluate it for one time after another;
-- ``foot`` and ``progress``: it depends on a point of a curve: its parameter, and its rate. Parameters 1 and 2 are then
-  the positions of the curve's two splines in ``data``.
+- ``foot`` and ``progress``: it depends on a point of a curve, or of another body: its parameter, and the rate of that;
+- ``offset``: that of a curve of the joint: the vector from the curve's point, and the curve's derivative;
+- ``SPLINES = True``, or ``offset``: parameters 1 and 2 are the positions of the joint's first two splines in ``data``;
+  more may follow at equal distances.
 """
 
 from __future__ import annotations
@@ -54,7 +56,9 @@ class Kind:
     points: str = ""
     foot: Callable | None = None
     progress: Callable | None = None
+    offset: Callable | None = None
     single: bool = False
+    splines: bool = False
 
     @property
     def place(self) -> bool:
@@ -67,9 +71,12 @@ def _kinds_of(module: ModuleType) -> list[Kind]:
     often, turns = getattr(module, "OFTEN", False), getattr(module, "TURNS", False)
     points = getattr(module, "POINTS", "")
     foot = getattr(module, "foot", None)
-    progress = module.progress if foot is not None else None
+    progress, offset = (module.progress if foot is not None else None), getattr(module, "offset", None)
+    splines = offset is not None or getattr(module, "SPLINES", False)
     single = getattr(module, "SINGLE", False)
-    return [Kind(number, row, often, turns, points, foot, progress, single) for number, row in rows.items()]
+    return [
+        Kind(number, row, often, turns, points, foot, progress, offset, single, splines) for number, row in rows.items()
+    ]
 
 
 def ordered(found: list[Kind]) -> tuple[Kind, ...]:

@@ -231,6 +231,11 @@ def _force_and_driver_functions(
                 [*names.values()],
                 partial(_law_value, law, [*names], known, tables),
             )
+    for coupling in s.model.couplings:
+        law = coupling.equation(s.model)
+        if law is not None and (names := _law_arguments(s.model, law, {}, to)):
+            value = partial(_law_value, law, [*names], known, tables)
+            yield coupling.name, f"{coupling.title}: its law '{law}'", [*names.values()], value
     for k, force in enumerate(s.forces):
         inputs: dict[str, str] = {}
         laws: list[Expression] = []
@@ -259,7 +264,7 @@ def _known_values(e: EquationDerivatives) -> tuple[dict[str, complex], dict]:
     """Parameters and time, and the tables of the model, by name."""
     model = e.state.c.structure.model
     known = {name: complex(value) for name, value in model.environment(e.state.c.parameters).items()}
-    return known | {"t": complex(e.state.t)}, {x.name: x for x in model.tables}
+    return known | {"t": complex(e.state.t)}, model.law_tables()
 
 
 def _controller_functions(

@@ -277,8 +277,8 @@ def _remaining_rates(x: MechanismState, e: EquationDerivatives) -> np.ndarray:
 
 
 def has_time_laws(S: System) -> bool:
-    """Whether a law of a force or a controller depends on time."""
-    for law in [*S.forces.laws.ravel().tolist(), *S.control_laws.tolist()]:
+    """Whether a law of a force, a controller or gravity depends on time."""
+    for law in [*S.forces.laws.ravel().tolist(), *S.control_laws.tolist(), *S.gravity_laws[:3].tolist()]:
         if law >= 0:
             program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
             if (program == (INPUT, 0)).all(axis=1).any():

@@ -183,6 +183,8 @@ def integral_rates(A, K, k):
         i = S.forces.work[f]
         if i >= 0:
             rate[i] = W.trial.rate[i]
+    if S.gravity_laws[3] >= 0:
+        rate[S.gravity_laws[3]] = W.trial.rate[S.gravity_laws[3]]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
             rate[S.rows.work[r]] = K.lam[k, r] * W.rows.nu[r]

@@ -169,9 +169,29 @@ REST_SPEED = 1e-9  # relative to the characteristic rate of a quantity: slower c
 
 
 @formula
-def inertial_wrenches(S, W):
-    """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
-    gravity = (S.gravity[0], S.gravity[1], S.gravity[2])
+def gravity_component(S, W, t, i):
+    """Component i of the acceleration of gravity."""
+    law = S.gravity_laws[i]
+    if law < 0:
+        return S.gravity[i]
+    o = 0.0 * t
+    return evaluate(S.code, S.const, law, W.stack, (t, o, o), W.sensed)
+
+
+@formula
+def inertial_wrenches(S, W, t, work):
+    """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre.
+
+    Where gravity is a law of time, the power of its change since t = 0 goes to ``work``: potential energy is that of
+    its value at t = 0.
+    """
+    gravity = (gravity_component(S, W, t, 0), gravity_component(S, W, t, 1), gravity_component(S, W, t, 2))
+    if S.gravity_laws[3] >= 0:
+        change = sub(gravity, (S.gravity[0], S.gravity[1], S.gravity[2]))
+        power = 0.0 * change[0]
+        for b in range(S.tree.parent.shape[0]):
+            power += S.bodies.mass[b] * dot(change, load3(W.bodies.velocity, b, 0))
+        work[S.gravity_laws[3]] = power
     for b in range(S.tree.parent.shape[0]):
         a = load3(W.bodies.bias_acceleration, b, 0)
         store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))

@@ -265,7 +265,7 @@ def apply_all_forces(S, W, t, p, work):
     if W.generated[LOADS] != 0:
         call_generated(W.generated[LOADS], S, W, t, p, work, p, work)
         return
-    inertial_wrenches(S, W)
+    inertial_wrenches(S, W, t, work)
     apply_forces(S, W, t, work)
     gather_forces(S, W, W.velocities.applied)
     apply_efforts(S, W, t, work, W.velocities.applied)

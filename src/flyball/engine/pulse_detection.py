@@ -47,7 +47,7 @@ INPUTS_WITHIN, NODE_VALUES, LAW_SELECTED, INSPECTION_ROWS = 0, 5, 6, 7
 
 def law_starts(S) -> np.ndarray:
     """Start of each law in the code, by its number (see `law_at`); -1 where there is none."""
-    return np.r_[S.forces.laws.ravel(), S.rows.law, S.tree.law]
+    return np.r_[S.forces.laws.ravel(), S.rows.law, S.tree.law, S.gravity_laws[:3]]
 
 
 def count_law_inputs(S) -> int:
@@ -96,7 +96,7 @@ def inspect_step(t, h, span, first, buffer, S, W):
     if first == 0 and branch_changes(S, buffer, h):
         return 1, 0.5, UNBOUNDED
     again = first % 2 == 1  # the law reported last has a second place
-    for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0]):
+    for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0] + 3):
         law = law_at(S, k)
         if buffer[LAW_SELECTED, k] > 0.0:
             n = max(MIN_SAMPLES, int(SAMPLES * min(1.0, h / span)))
@@ -112,13 +112,14 @@ def inspect_step(t, h, span, first, buffer, S, W):
 
 @formula
 def law_at(S, k):
-    """Start of law number k, in the order forces, rows, prescribed coordinates; -1 if it has none."""
+    """Start of law number k, in the order forces, rows, prescribed coordinates, gravity; -1 if it has none."""
     if k < LAWS * S.forces.F.shape[0]:
         return S.forces.laws[k // LAWS, k % LAWS]
     k -= LAWS * S.forces.F.shape[0]
     if k < S.rows.law.shape[0]:
         return S.rows.law[k]
-    return S.tree.law[k - S.rows.law.shape[0]]
+    k -= S.rows.law.shape[0]
+    return S.tree.law[k] if k < S.tree.parent.shape[0] else S.gravity_laws[k - S.tree.parent.shape[0]]
 
 
 @formula

@@ -65,7 +65,7 @@ from .stabilization import set_prescribed
 
 
 @formula
-def inertial_terms(S, W, vdot, out):
+def inertial_terms(S, W, t, vdot, out):
     """Write inertial wrench and weight of every body, projected on its own and its ancestors' velocities.
 
     Inertias of rotors join the term of the velocity with which they turn.
@@ -74,7 +74,7 @@ def inertial_terms(S, W, vdot, out):
     """
     for i in range(out.shape[0]):
         out[i] = 0.0
-    inertial_wrenches(S, W)
+    inertial_wrenches(S, W, t, W.trial.rate)
     at = 0
     for b in range(S.tree.parent.shape[0]):
         force, torque = load3(W.body_wrenches.force, b, 0), load3(W.body_wrenches.torque, b, 0)
@@ -92,7 +92,7 @@ def residual_terms(S, W, t, vdot, lam, out):
     The order is that of `simulation/jacobian_pattern.py`: bodies; of each force between frames the side of M,
     then that of F; rows; forces along measured quantities.
     """
-    at = inertial_terms(S, W, vdot, out)
+    at = inertial_terms(S, W, t, vdot, out)
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] == BETWEEN:
             _, M, force, torque = wrench_between_frames(S, W, t, k)
@@ -260,7 +260,7 @@ def residuals(S, W, bench, task):
             for b in range(S.tree.parent.shape[0]):
                 body_pose(S, W, b, p[:nq])
                 accelerated_motion(S, W, b, p[nq : nq + nv], a)
-            inertial_terms(S, W, a, bench.out[n, behind:])
+            inertial_terms(S, W, t, a, bench.out[n, behind:])
         else:
             update_accelerated_kinematics(S, W, t, p, a, task == RESIDUAL_STEPS or S.sensor_drivers.row.shape[0] > 0)
             if task == RESIDUAL_TERMS:
@@ -317,7 +317,7 @@ def store_residual(S, W, t, p, vdot, lam, out):
         out[nv + 3 * nr + 2 * nm + m] = W.sensed.bias[m]
     f = W.velocities.applied
     apply_multipliers(S, W, t, p, lam)
-    inertial_wrenches(S, W)
+    inertial_wrenches(S, W, t, W.trial.rate)
     apply_forces(S, W, t, W.trial.rate)
     gather_forces(S, W, f)
     apply_efforts(S, W, t, W.trial.rate, f)

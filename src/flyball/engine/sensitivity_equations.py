@@ -165,6 +165,8 @@ def state_change(A, P, k, dq, dv, dc, rate, powers):
     for f in range(S.forces.F.shape[0]):
         if S.forces.work[f] >= 0:
             powers[S.forces.work[f]] = WC.trial.rate[S.forces.work[f]].imag / COMPLEX_STEP
+    if S.gravity_laws[3] >= 0:
+        powers[S.gravity_laws[3]] = WC.trial.rate[S.gravity_laws[3]].imag / COMPLEX_STEP
     if P.pressing.shape[0] > 0:
         add_friction_feedback(P, found, powers, nv)
     for r in range(nr):

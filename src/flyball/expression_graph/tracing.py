@@ -158,8 +158,8 @@ def trace_equations(
     T = np.array([[0.0] * nv] * s.nq, object).reshape(s.nq, nv)
     _rates(S, q, v, T)
     f = W.velocities.applied
-    inertial_wrenches(S, W)
     update_controllers(S, W, t, z, zdot)
+    inertial_wrenches(S, W, t, zdot)
     apply_forces(S, W, t, zdot)
     gather_forces(S, W, f)
     apply_efforts(S, W, t, zdot, f)
@@ -205,10 +205,10 @@ def tables_by_name(s: Structure, S: System) -> dict[int, str]:
     """Names of tables by start index in the table of constants; curves of joints are tables of x and y."""
     found = {at: name for name, at in s.table_at.items()}
     for k, t in enumerate(s.terms):
-        if t.formula.of_kind.place:
+        if t.formula.of_kind.splines:
             found |= {
-                int(S.term_parameters[k, 1].real): f"{t.element.name}.x",
-                int(S.term_parameters[k, 2].real): f"{t.element.name}.y",
+                int(S.term_parameters[k, 1].real): f"{(t.owner or t.element).name}.x",
+                int(S.term_parameters[k, 2].real): f"{(t.owner or t.element).name}.y",
             }
     return found
 
@@ -337,6 +337,9 @@ def joint_efforts(model: Model, e: JointController, moving: bool) -> list[Syntax
     told = {k: number(x, symbols, None, f"parameter {k!r} of {e.title}") for k, x in e.parameters}
     given = symbols | told
     S = values(s, given).system if given else object_tables(values(s).system)
+    now = given | {"t": graph.symbol("t")}
+    laws = zip(S.gravity, robot.gravity_laws(), strict=True)
+    S = S._replace(gravity=np.array([g if law is None else law.evaluate(now) for g, law in laws], object))
     q, v, a = (np.zeros(s.nv, object) for _ in range(3))
     bodies = S.tree.parent.shape[0]
     of_velocity = np.repeat(np.arange(bodies), S.tree.nv)
@@ -483,7 +486,8 @@ def time_derivative(tree: SyntaxNode, model: Model, where: str, given: str) -> S
         If the law reads something else, or calls a Python function or a table with jumps of the slope.
     """
     parameters = model.environment()
-    smooth = {x.name for x in model.tables if x.interpolation != "linear"}
+    tables = model.law_tables()
+    smooth = {x.name for x in tables.values() if x.interpolation != "linear"}
     for n in tree.walk():
         unknown = n.kind == "name" and n.value not in {"t", *parameters}
         if unknown or n.kind in ("function", "called") or (n.kind == "table" and called_table(n)[0] not in smooth):
@@ -493,7 +497,7 @@ def time_derivative(tree: SyntaxNode, model: Model, where: str, given: str) -> S
     t = graph.symbol("t")
     known: dict[str, Any] = {k: graph.symbol(k, x) for k, x in parameters.items()}
     law = Expression("", tree)
-    curves: Any = {name: _Curve(model[name]) for name in law.tables}
+    curves: Any = {name: _Curve(tables[name]) for name in law.tables}
     value = law.evaluate({**known, "t": t}, curves)
     return law_tree(directional_derivatives([value], [(t, 1.0)])[0])
 

@@ -75,7 +75,8 @@ class Limit(WeightedSumForce, Unilateral):
     weights : list of numbers
         One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
     lower, upper : number [rad] or [m]
-        Least and greatest value; no stop on a side that is not given.
+        Least and greatest value; no stop on a side that is not given. Equal ones lock the coordinate there: the force
+        is that of a lock, in either direction.
     restitution : number [1]
         Of a rigid stop, from 0 (no rebound; the default) to 1 (no energy lost).
     stiffness : number [N/m] or [N m/rad]
@@ -111,10 +112,10 @@ class Limit(WeightedSumForce, Unilateral):
             raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")
 
     def check_range(self, n: SimpleNamespace, unit: str) -> None:
-        """Require that the lower stop is below the upper one."""
-        if n.lower is not None and n.upper is not None and not n.lower.real < n.upper.real:
+        """Require that the lower stop is not above the upper one."""
+        if n.lower is not None and n.upper is not None and not n.lower.real <= n.upper.real:
             raise ModelError(
-                f"{self.title}: lower is {n.lower:g} {unit}; it must be less than upper, {n.upper:g} {unit}"
+                f"{self.title}: lower is {n.lower:g} {unit}; it must not be greater than upper, {n.upper:g} {unit}"
             )
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

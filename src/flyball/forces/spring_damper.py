@@ -28,8 +28,8 @@ def inputs(par, F, M):
 def wrench(par, F, M, laws, values):
     """Force on M: -k d - (c rate + s) e with e = d / |d|, and s = F - k times free length.
 
-    If both points coincide, e is undefined: the damper then acts against the relative velocity, and the force is nan if
-    s is not zero.
+    If both points coincide, e is the direction in which they move apart; without a relative velocity it is undefined,
+    and the force nan if s is not zero.
     """
     length, rate = values
     d, u = sub(M[0], F[0]), sub(M[3], F[3])
@@ -37,10 +37,12 @@ def wrench(par, F, M, laws, values):
     s = laws[0] - par[0] * par[2]
     e = scale(divide(1.0, length), d)
     t = par[1] * rate + s
+    speed = norm(u)
+    way = scale(divide(1.0, speed), u)
     undefined = choose(absolute(s), o + math.nan, o)
-    x = unless_zero(length, t * e[0], par[1] * u[0] + undefined)
-    y = unless_zero(length, t * e[1], par[1] * u[1] + undefined)
-    z = unless_zero(length, t * e[2], par[1] * u[2] + undefined)
+    x = unless_zero(length, t * e[0], par[1] * u[0] + unless_zero(speed, s * way[0], undefined))
+    y = unless_zero(length, t * e[1], par[1] * u[1] + unless_zero(speed, s * way[1], undefined))
+    z = unless_zero(length, t * e[2], par[1] * u[2] + unless_zero(speed, s * way[2], undefined))
     return neg(add(scale(par[0], d), (x, y, z))), (o, o, o)
 
 
@@ -55,8 +57,9 @@ def energy(par, F, M):
 class SpringDamper(TwoPointForce):
     """Spring, damper and actuator between a point of one body and a point of another.
 
-    The tension k (l - l0) + c ldot + F pulls the two points together where it is positive. Without a free length
-    (``length=0``) and F, both points may coincide: there the damper acts against the relative velocity.
+    The tension k (l - l0) + c ldot + F pulls the two points together where it is positive. Both points may
+    coincide where they move apart, and where the tension is zero there (``length=0``, no F): there the damper acts
+    against the relative velocity.
 
     Parameters
     ----------
@@ -85,8 +88,8 @@ class SpringDamper(TwoPointForce):
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "force": "N"}
     symbol: ClassVar[str] = "spring"
     fails: ClassVar[str] = (
-        "Its two points coincide, where a force along the line between them has no direction, unless length is 0 and "
-        "there is no force="
+        "Its two points coincide at rest, where a force along the line between them has no direction; give length=0, "
+        "or an initial velocity or a position that moves them apart"
     )
 
     def check(self, n: SimpleNamespace) -> None:

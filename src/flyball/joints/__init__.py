@@ -10,22 +10,26 @@ True where the coordinates are slips of one surface: friction along a second one
 `model.joint.Joint` says what every such attribute means. Samples in tests: ``contract/zoo.py``, ``robust/joints.py``;
 if its axes must be at right angles, also ``RIGHT_ANGLES`` of ``identities/test_complex_values.py``.
 
-A coupling derives from `Coupling`: ``coupled()`` names coordinates of other joints, ``factors()`` their weights.
+A coupling derives from `Coupling`: ``coupled()`` names coordinates of other joints, ``factors()`` their weights, or
+``equation()`` gives a nonlinear relation.
 Imports `constraints`, `math` and `model` only. Coordinates are zero in the reference configuration, not where axes of
 bodies are parallel: links with arbitrary body frames would begin at odd angles.
 """
 
 from .cam import Cam as Cam
+from .constraint import Constraint as Constraint
 from .coupler import Coupler as Coupler
 from .cylindrical import Cylindrical as Cylindrical
 from .distance import Distance as Distance
 from .fixed import Fixed as Fixed
+from .flat_faced_cam import FlatFacedCam as FlatFacedCam
 from .gear_pair import GearPair as GearPair
 from .general_universal import GeneralUniversal as GeneralUniversal
 from .knife_edge import KnifeEdge as KnifeEdge
 from .orientation import Orientation as Orientation
 from .planar import Planar as Planar
 from .point_in_plane import PointInPlane as PointInPlane
+from .point_on_curve import PointOnCurve as PointOnCurve
 from .point_on_line import PinInSlot as PinInSlot
 from .point_on_line import PointOnLine as PointOnLine
 from .prismatic import Prismatic as Prismatic

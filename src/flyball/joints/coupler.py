@@ -21,7 +21,7 @@ SUMS = ("1", "m", "rad")
 class Coupler(Coupling):
     """A linear relation between coordinates of joints or points: weight_1 q_1 + weight_2 q_2 + ... = constant.
 
-    For a nonlinear relation use a `Driver` whose law names sensors.
+    For a nonlinear relation use a `Constraint`.
 
     Parameters
     ----------

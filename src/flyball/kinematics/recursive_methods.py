@@ -286,7 +286,8 @@ class RecursiveMethods:
     several results a tuple); ``threads`` divides the states among threads, with the same result to the last bit.
     Generalised forces and velocities are in the order of `Prepared.names`, in SI units.
 
-    These methods see bodies, tree joints and gravity. Springs, drivers, contacts and other forces are not part of them:
+    These methods see bodies, tree joints and gravity (of a law of time, its value at t = 0). Springs, drivers,
+    contacts and other forces are not part of them:
     `forces` and `acceleration` include these. Of mechanisms with closed loops, the mass matrix and the inverse dynamics
     are those of the tree of joints (loops add G^T lam), unless drives are named; `aba` and `reduced_mass_matrix`
     include the loops. Non-finite numbers, wrong shapes and quaternions of length zero raise `ModelError`; other

@@ -117,7 +117,7 @@ def self_stresses(
     s, S = x.structure, x.system
     out = {n: np.zeros((*lam.shape[:-2], 6, lam.shape[-1])) for n in names}
     for name in names:
-        for k in s.terms_of[name]:
+        for k in s.terms_of.get(name, ()):
             t = s.terms[k]
             par = row_parameters(S.term_parameters, k)
             hint = z[t.hint] if t.hint >= 0 else 0.0

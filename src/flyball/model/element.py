@@ -308,6 +308,9 @@ class Element(metaclass=ElementType):
     def check(self, n: SimpleNamespace) -> None:
         """Refuse invalid numbers; ``n`` contains the resolved fields."""
 
+    def derive(self, n: SimpleNamespace, env: Mapping[str, Any]) -> None:
+        """Add numbers that follow from its fields and the parameters to the resolved fields."""
+
     def bound(self, model: Any) -> Element:
         """Return the element with properties that depend on the model's other elements; by default itself."""
         return self
@@ -371,6 +374,8 @@ def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
     n = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
     for name, unit in fields_with(e.__class__, Unit).items():
         setattr(n, name, si_numbers(getattr(e, name), env, unit.dimension, f"{name} of {e.title}"))
+    if isinstance(e, Element):
+        e.derive(n, env)
     return n
 
 

@@ -160,12 +160,15 @@ def _deciding_quantity(law: Expression, model: Model, to: Sequence[str]) -> str:
 
 
 def force_and_driver_laws(model: Model) -> Iterator[tuple[str, Expression]]:
-    """Return the titles of forces and drivers with their laws."""
+    """Return the titles of forces, couplings and drivers with their laws."""
     given: list[tuple[Any, Any, LawOf]] = [(d, d.law, LawOf(model.unit(d.coordinate, d))) for d in model.drivers]
     for e in model.forces:
         for field, of in fields_with(e.__class__, LawOf).items():
             value = getattr(e, field)
             given += [(e, law, of) for law in (value if isinstance(value, tuple) else (value,)) if law is not None]
+    for c in model.couplings:
+        if (equation := c.equation(model)) is not None:
+            yield c.title, equation
     for e, law, of in given:
         if (found := model.law(law, of, e.title)) is not None:
             yield e.title, found

@@ -11,10 +11,11 @@ import difflib
 import inspect
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
+from types import MappingProxyType
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -116,10 +117,12 @@ def tree_text(node: SyntaxNode) -> str:
     return f"{node.value if node.kind == 'table' else node.kind}({', '.join(bare)})"
 
 
-def parse_text(text: str, tables: Collection[str] = (), curves: bool = False) -> tuple[str, SyntaxNode]:
+def parse_text(
+    text: str, tables: Mapping[str, Sequence[str]] = MappingProxyType({}), curves: bool = False
+) -> tuple[str, SyntaxNode]:
     """Return the text on one line, and its tree; `ExpressionError` if it is not a formula.
 
-    ``tables``: names of tables; ``curves``: whether names may have dots, such as A.angle.
+    ``tables``: arguments of tables by name; ``curves``: whether names may have dots, such as A.angle.
     """
     text = "".join(" " if c.isspace() else c for c in text).strip()
     if not text:
@@ -166,7 +169,7 @@ class _Reader:
         text: str,
         masked: str,
         quantities: dict[str, tuple[float, int]],
-        tables: Collection[str],
+        tables: Mapping[str, Sequence[str]],
         curves: bool = False,
     ) -> None:
         self.text = text
@@ -220,7 +223,8 @@ class _Reader:
             example = f"{node.id}({', '.join(FUNCTIONS[node.id])})"
             self.refuse(node, f"'{node.id}' is a function", f"give its arguments: {example}")
         if node.id in self.tables:
-            self.refuse(node, f"'{node.id}' is a table", f"give its argument: {node.id}(x)")
+            call = f"{node.id}({', '.join(self.tables[node.id])})"
+            self.refuse(node, f"'{node.id}' is a table", f"give its argument: {call}")
         if node.id in CONSTANTS:
             return self.syntax_node(node, "number", value=CONSTANTS[node.id])
         return self.syntax_node(node, "name", value=node.id)
@@ -279,12 +283,12 @@ class _Reader:
             listed = f"known functions: {', '.join(sorted(FUNCTIONS))}"
             listed += f"; tables: {', '.join(sorted(self.tables))}" if self.tables else ""
             self.refuse(node.func, f"unknown function '{name}'", f"{guess}{product}{listed}")
-        wanted, given = ("x",) if is_table else FUNCTIONS[name], len(node.args)
+        wanted, given = self.tables[name] if is_table else FUNCTIONS[name], len(node.args)
         if node.keywords or (given < 2 if wanted[-1] == "..." else given != len(wanted)):
             call = f"{name}({', '.join(wanted)})"
             self.refuse(node, f"wrong arguments: {given} given", f"write {call}, without names")
         if is_table:
-            return self.syntax_node(node, "table", [self.read(node.args[0])], name)
+            return self.syntax_node(node, "table", [self.read(a) for a in node.args], name)
         return self.syntax_node(
             node, name, [self.read(a, condition=name == "where" and i == 0) for i, a in enumerate(node.args)]
         )

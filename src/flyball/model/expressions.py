@@ -62,7 +62,9 @@ class Expression:
         ExpressionError
             If the text is not an expression of the known operators, functions, tables and constants.
         """
-        return _parsed(text, frozenset(tables), curves)
+        known: Mapping[str, Any] = tables if isinstance(tables, Mapping) else dict.fromkeys(tables)
+        called = ((name, getattr(table, "arguments", ("x",))) for name, table in known.items())
+        return _parsed(text, frozenset(called), curves)
 
     @classmethod
     def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
@@ -154,9 +156,9 @@ class Expression:
 
 
 @lru_cache(maxsize=8192)
-def _parsed(text: str, tables: frozenset[str], curves: bool) -> Expression:
+def _parsed(text: str, tables: frozenset[tuple[str, tuple[str, ...]]], curves: bool) -> Expression:
     """Parse a text (cached: it is read when an element is added, and again for each analysis)."""
-    return Expression(*parse_text(text, tables, curves))
+    return Expression(*parse_text(text, dict(tables), curves))
 
 
 def number(

@@ -16,6 +16,7 @@ from .element import Direction, Element, Point
 from .geometry import triad, vector
 
 if TYPE_CHECKING:
+    from .expressions import Expression
     from .model import Model
 
 
@@ -253,7 +254,7 @@ def check_weights(e: Element, coordinates: tuple[str, ...], weights: tuple[float
 
 @dataclass(frozen=True)
 class Coupling(Element):
-    """One constraint row: a weighted sum of coordinates keeps its reference value.
+    """One constraint row: a weighted sum of coordinates keeps its reference value, or an equation of them holds.
 
     Full turns of angles are counted, so a gear train keeps its phase over any number of turns.
     """
@@ -270,6 +271,10 @@ class Coupling(Element):
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
         """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world, as drawn."""
         raise NotImplementedError
+
+    def equation(self, model: Model) -> Expression | None:
+        """Return the expression of coordinates and time that is kept at zero; None: the weighted sum is kept."""
+        return None
 
     def first_weight(self, n: SimpleNamespace) -> float:
         """Return the weight of the first coordinate, as given."""

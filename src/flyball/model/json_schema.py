@@ -21,7 +21,7 @@ from ..errors import ModelError
 from .element import Element, Flag, Number, Numbers, Unit, fields_with
 from .event import Action
 from .model import Model
-from .model_files import DEFAULT_KINDS, MANY_KINDS, ONE_KIND, SENSORS, element_types
+from .model_files import DEFAULT_KINDS, FEW_KINDS, MANY_KINDS, ONE_KIND, element_types
 from .shapes import SHAPES, SURFACES
 from .shapes.solid import Solid
 from .snapshot import CATEGORIES
@@ -75,7 +75,7 @@ def _category_schema(category: str) -> dict[str, Any]:
     """Return the schema of all tables of a category."""
     if category in ONE_KIND:
         return _list_of(ONE_KIND[category], {"$ref": f"#/$defs/{ONE_KIND[category].__name__}"})
-    base = MANY_KINDS[category][0] if category in MANY_KINDS else SENSORS[DEFAULT_KINDS[category]]
+    base = MANY_KINDS[category][0] if category in MANY_KINDS else FEW_KINDS[category][DEFAULT_KINDS[category]]
     return _list_of(base, _selected_by_type(element_types(category), DEFAULT_KINDS.get(category, "")))
 
 

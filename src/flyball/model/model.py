@@ -35,6 +35,7 @@ from .snapshot import (
     snapshot,
 )
 from .table import Table
+from .table_2d import Table2D
 from .units import same_kind
 from .validation import check_kind, check_name, check_references, check_vectors, checked_law, gravity_as_written
 
@@ -69,12 +70,11 @@ class Model:
         self.environment()
         self.gravity = tuple(gravity_as_written(self, (0.0,) * (2 if planar else 3) if gravity is None else gravity))
         self.gravity_told = gravity is not None
-        self.gravity_vector()
         self.bodies: list[Body] = []
         self.frames: list[Frame] = []
         self.joints: list[Joint] = []
         self.couplings: list[Coupling] = []
-        self.tables: list[Table] = []
+        self.tables: list[Table | Table2D] = []
         self.sensors: list[Sensor | IMU] = []
         self.controllers: list[Controller] = []
         self.forces: list[Force] = []
@@ -88,6 +88,7 @@ class Model:
         self.limits: list[Unilateral] = []
         self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
+        self.gravity_vector()
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> ParameterValues:
         """Return the values of the parameters in SI units, with some of them changed.
@@ -143,10 +144,29 @@ class Model:
         super().__setattr__(name, value)
 
     def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:
-        """Acceleration of gravity [m/s^2], three components."""
+        """Acceleration of gravity [m/s^2], three components; where it is a law of time, at t = 0."""
         env = self.environment() if env is None else env
         what = f"gravity of {self.name!r}"
-        return vector([number(x, env, "m/s^2", what) for x in self.gravity], self.planar, what)
+        laws = (*self.gravity_laws(), *(None,) * len(self.gravity))
+        at_start = {**env, "t": 0.0}
+        given = [
+            number(x if law is None else law, env if law is None else at_start, "m/s^2", what)
+            for x, law in zip(self.gravity, laws, strict=False)
+        ]
+        return vector(given, self.planar, what)
+
+    def gravity_laws(self) -> tuple[Expression | None, ...]:
+        """Return the three components of gravity as laws of time; None: the component is constant."""
+        where = f"gravity of {self.name!r}"
+        texts = [x for x in self.gravity[:3] if isinstance(x, str) and re.search(r"\bt\b", x)]
+        if not texts:
+            return (None, None, None)
+        laws = [self.law(x, LawOf("m/s^2"), where) if x in texts else None for x in self.gravity[:3]]
+        for law in laws:
+            if law is not None and (others := sorted(law.names - {"t", *self.parameters})):
+                raise ModelError(f"{where}: {law.text!r} names {others[0]!r}; it is a law of t and parameters only")
+        laws = [law if law is not None and "t" in law.names else None for law in laws]
+        return (*laws, *(None,) * (3 - len(laws)))
 
     def elements(self) -> Iterator[Element]:
         """Return all parts, category by category, in the order they were added."""
@@ -354,6 +374,10 @@ class Model:
         If ``whole``, signals of controllers are replaced by their formulas.
         """
         return checked_law(self, value, of, where, driver, whole)
+
+    def law_tables(self) -> dict[str, Table]:
+        """Return all tables of one argument by name: also those that tables of two arguments are composed of."""
+        return {name: table for x in self.tables for name, table in x.curves().items()}
 
     def names_in_laws(self, of: LawOf) -> set[str]:
         """Return all names that such a law may use; also curves, if it may use these."""

@@ -32,6 +32,7 @@ from .output_files import DESCRIPTION, file_extension, write_file
 from .shapes.mesh import Mesh, paths_from
 from .snapshot import CATEGORIES
 from .table import Table
+from .table_2d import Table2D
 
 M = TypeVar("M", bound=Model)
 
@@ -44,14 +45,13 @@ ONE_KIND = {
     "bodies": Body,
     "bulk": Bodies,
     "frames": Frame,
-    "tables": Table,
     "drivers": Driver,
     "initial": Initial,
     "contacts": Contact,
     "events": Event,
 }
 MUTUAL = "controllers"  # categories whose elements may refer to each other
-AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
+AFTER_OTHERS = ("couplings", "sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
 SELF_NAMED = ("material_pairs", "contacts")  # categories with automatic names
 MANY_KINDS = {
     "joints": (Joint, "joints"),
@@ -60,8 +60,11 @@ MANY_KINDS = {
     "forces": (Force, "forces"),
     "limits": (Unilateral, "forces"),
 }
-DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit"}  # default types
-SENSORS = {"Sensor": Sensor, "IMU": IMU}
+DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit", "tables": "Table"}  # default types
+FEW_KINDS: dict[str, dict[str, type[Element]]] = {
+    "sensors": {"Sensor": Sensor, "IMU": IMU},
+    "tables": {"Table": Table, "Table2D": Table2D},
+}
 WIDTH = 100  # longer lists of shapes are written with one shape per line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
@@ -344,8 +347,8 @@ def _make_element(category: str, table: Mapping[str, Any], where: str) -> Elemen
 
 def element_types(category: str) -> list[str]:
     """Return the types that the tables of a category may name; those of the user's own classes last."""
-    if category == "sensors":
-        return sorted(SENSORS)
+    if category in FEW_KINDS:
+        return sorted(FEW_KINDS[category])
     base, room = MANY_KINDS[category]
     importlib.import_module(f"..{room}", __package__)
     kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}

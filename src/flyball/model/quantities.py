@@ -92,8 +92,10 @@ def _quantity_table(model: Model, name: str) -> Table:
     if isinstance(e, Force):
         return _of_force(model, e, axes)
     if isinstance(e, Coupling):
-        units = [_effort(model.unit(text, e)) for text in e.coupled()]
-        return {f"effort_{k}": Quantity(unit, curve=True, array=True) for k, unit in enumerate(units, 1)}
+        units = {f"effort_{k}": _effort(model.unit(text, e)) for k, text in enumerate(e.coupled(), 1)}
+        equation = e.equation(model)
+        units |= {"work": "J"} if equation is not None and "t" in equation.names else {}
+        return {k: Quantity(unit, curve=True, array=True) for k, unit in units.items()}
     if isinstance(e, Driver):
         effort = Quantity(_effort(model.unit(e.coordinate, e)), curve=True, array=True)
         return {"effort": effort, "work": Quantity("J", curve=True, array=True)}
@@ -235,7 +237,7 @@ def _of_joint(e: Joint, axes: str) -> Table:
             out |= {"rate": Quantity(rate.unit, f"{what}_rate", curve=True)}
             out |= {"acceleration": Quantity(second.unit, f"{what}_acceleration")}
         out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
-    if hasattr(e, "nearest"):
+    if hasattr(e, "nearest") and "position" not in own:
         out["place"] = Quantity("m", curve=True)
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
 

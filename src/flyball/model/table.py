@@ -50,17 +50,19 @@ class Table(Element):
     y_unit: str = ""
 
     category: ClassVar[str] = "tables"
+    arguments: ClassVar[tuple[str, ...]] = ("x",)
     hints: ClassVar[dict[str, str]] = {
         "outside": "this field is now beyond: 'hold', 'line' (formerly 'linear') or 'repeat' (formerly 'periodic')"
     }
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse invalid points, and a name that expressions could not use."""
-        if not self.name.isidentifier() or keyword.iskeyword(self.name):
-            raise ModelError(f"{self.title}: expressions call a table by its name; use letters, digits and _ only")
-        if self.name in FUNCTIONS or self.name in CONSTANTS or self.name == "t":
-            raise ModelError(f"{self.title}: the name has a meaning in expressions; call it '{self.name}_curve'")
+        check_table_name(self)
         self._points()
+
+    def curves(self) -> dict[str, Table]:
+        """Return itself by name: the tables of one argument that it is composed of."""
+        return {self.name: self}
 
     def data(self) -> list[float]:
         """Return the curve in SI units as the flat list that `flyball.math.spline` reads.
@@ -159,6 +161,20 @@ class Table(Element):
             return np.array(values) * (to_si(f"1 {unit}", None) if unit else 1.0)
         except UnitError as error:
             raise UnitError(f"{self.title}: {name}_unit: {error}") from None
+
+
+def check_table_name(e: Element) -> None:
+    """Refuse a name that expressions could not use.
+
+    Raises
+    ------
+    ModelError
+        Naming the table.
+    """
+    if not e.name.isidentifier() or keyword.iskeyword(e.name):
+        raise ModelError(f"{e.title}: expressions call a table by its name; use letters, digits and _ only")
+    if e.name in FUNCTIONS or e.name in CONSTANTS or e.name == "t":
+        raise ModelError(f"{e.title}: the name has a meaning in expressions; call it '{e.name}_curve'")
 
 
 def _cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:

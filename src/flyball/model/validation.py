@@ -26,12 +26,13 @@ from .inertia import checked_shapes, mass_properties
 from .joint import Coupling, Joint
 from .quantities import Curve, measured_quantity, transmitted_force
 from .table import Table
+from .table_2d import Table2D, separate_tables
 
 if TYPE_CHECKING:
     from .model import Model
 
 
-RESERVED = (GROUND, "energy", "t", "time")
+RESERVED = (GROUND, "energy", "gravity", "t", "time")
 
 
 def check_name(model: Model, e: Element) -> None:
@@ -51,7 +52,7 @@ def check_name(model: Model, e: Element) -> None:
         raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
     if isinstance(e, (Sensor, Controller)):
         _check_read(e)
-    if isinstance(e, (Sensor, Table, Controller)) and e.name in model.parameters:
+    if isinstance(e, (Sensor, Table, Table2D, Controller)) and e.name in model.parameters:
         raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
     if e.name in model.by_name:
         raise ModelError(f"{e.title}: the name is taken by {model.by_name[e.name].title}; names must be unique")
@@ -275,7 +276,8 @@ def checked_law(
         if not of.curves and any("." in k and k not in signals for k in expression.names - set(names)):
             controller_signals.refuse_unknown(model, expression)
             law_expression(value, of.dimension, where, tables, names)  # parsing refuses curves of other parts
-        expression = dataclasses.replace(expression, where=where)
+        tree = separate_tables(expression.tree, tables) if expression.tables else expression.tree
+        expression = dataclasses.replace(expression, tree=tree, where=where)
         if expression.tree.kind == "name":
             check_dimension(expression.tree.value, model.environment(), of.dimension, f"{where}: ")
         if expression.tree.kind == "number":

@@ -89,7 +89,7 @@ class Energy(NamedQuantities):
 
     @cached_property
     def gravity(self) -> np.ndarray:
-        """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
+        """Potential energy of gravity (its value at t = 0), zero where all mass centres lie in the world's origin."""
         if self._result.pieces:
             return self._concatenated("gravity")
         S = self._result.values.system
@@ -115,13 +115,16 @@ class Energy(NamedQuantities):
     def work(self) -> dict[str, np.ndarray]:
         """Work done since the start by each damper, actuator, motor, given force and driver.
 
-        It excludes energy stored in a spring of the same element, which is potential energy, and the energy of
+        Where gravity is a law of time, ``"gravity"`` is the work of its change since t = 0. It excludes energy
+        stored in a spring of the same element, which is potential energy, and the energy of
         stiffness changes, which is done by events.
         """
         out = {}
         r = self._result
         for name in r.values.structure.states:
-            if name.endswith(".work"):
+            if name == "gravity.work":
+                out["gravity"] = r.states[:, r.values.structure.state_at[name]]
+            elif name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
                 own = element.element
                 stores = isinstance(own, Force) and own.energy is not None
@@ -280,7 +283,7 @@ def budgets_by_part(result: Result) -> list[EnergyBudget]:
     s, S = result.values.structure, result.values.system
     part = s.cache.get("connected", None, 1, partial(connected_parts, S))
     many = int(part.max(initial=0)) + 1
-    if many < 2 or result.bulk or not len(result.t):
+    if many < 2 or result.bulk or "gravity.work" in s.state_at or not len(result.t):
         return []
     rows, figures = result.record.rows, result.record.figures
     of_force = [_part_of(result, f, part) for f in s.forces]

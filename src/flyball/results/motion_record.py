@@ -17,6 +17,7 @@ import numpy as np
 
 from ..compiler.kernels import PooledBuffer, StructPool
 from ..compiler.struct_layout import Record
+from ..constraints.blocks import Row
 from ..engine.entry_point import engine, idle_clock_pool, idle_tableau, no_output, pooled_work, struct_tables
 from ..engine.kinematics import (
     BodyKinematics,
@@ -214,6 +215,19 @@ def _end(records: RecordedMotion, owner: Joint | Located, role: str) -> Kinemati
     return records.named(owner.name) if role == "M" else records.attached(-1, (0.0,) * 3, tuple(np.eye(3).ravel()))
 
 
+def coordinate_parameters(x: Values, owner: Joint | Located, row: Row) -> tuple[float, ...]:
+    """Return the parameters of a coordinate's formula, without its constant."""
+    if not row.of_kind.place:
+        return (*row.par[:6], 0.0, 0.0)
+    first, second = x.system.term_parameters[x.structure.terms_of[owner.name][0], 1:3]  # of the joint's own rows
+    return (row.par[0], float(first.real), float(second.real), *(0.0,) * 5)
+
+
+def curve_places(result: Result, owner: Any) -> np.ndarray:
+    """Return the position of a joint's point on its curve over time."""
+    return result.states[:, result.values.structure.state_at[f"{owner.name}.place"]]
+
+
 def measured_coordinate(
     records: RecordedMotion, owner: Joint | Located, what: str, turns: Any = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -223,11 +237,12 @@ def measured_coordinate(
     times resolve it.
     """
     F, M, c = coordinate_records(records, owner, what)
-    par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+    par = coordinate_parameters(records.x, owner, c.row)
     counts = c.row.of_kind.turns and turns is not None
+    hint = turns if counts or c.row.of_kind.place else 0.0
     with np.errstate(all="ignore"):  # at a singular position
         value, f, tM, tF, second = c.row.of_kind.row(
-            (1.0, *par[1:]) if counts else par, F, M, turns if counts else 0.0, records.x.system.const
+            (1.0, *par[1:]) if counts else par, F, M, hint, records.x.system.const
         )
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
     if c.row.of_kind.turns and not counts:
@@ -243,6 +258,14 @@ def _turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
 
 
 Wrench = tuple[tuple, tuple]
+
+
+def gravity_over_time(result: Result) -> tuple[Any, ...]:
+    """Return the components of the acceleration of gravity [m/s^2]: numbers, or over time."""
+    known = {**result.values.env, "t": result.t}
+    laws = result.values.structure.model.gravity_laws()
+    constant = result.values.system.gravity
+    return tuple(g if law is None else law.evaluate(known) for g, law in zip(constant, laws, strict=True))
 
 
 def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRecord, tuple]:
@@ -283,8 +306,9 @@ def term_coefficient(result: Result, k: int) -> float:
 def unit_effort_wrench(result: Result, owner: Joint | Located, what: str) -> Wrench:
     """Return the wrench on ``body_j``, or on the body, about M's origin, of a unit effort along a coordinate."""
     F, M, c = coordinate_records(result.motions, owner, what)
-    par = (*c.row.par[:6], 0.0, 0.0)
-    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
+    par = coordinate_parameters(result.values, owner, c.row)
+    hint = curve_places(result, owner) if c.row.of_kind.place else 0.0
+    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, hint, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
     return scale(c.sign, force), scale(c.sign, torque)
 

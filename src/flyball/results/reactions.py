@@ -33,6 +33,7 @@ from ..tables.constraint_rows import reacting_element
 from ..tables.table_definitions import Wrenches
 from .motion_record import (
     Wrench,
+    gravity_over_time,
     term_coefficient,
     term_over_time,
     unit_effort_wrench,
@@ -160,7 +161,7 @@ class JointReactions:
         """Return kinematics, and gravity minus the inertia forces of each body."""
         S, records = self._result.values.system, self._result.records
         W = SimpleNamespace(bodies=records.W.bodies, body_wrenches=zero_wrenches(records))
-        gravity = tuple(S.gravity)
+        gravity = gravity_over_time(self._result)
         for b in range(len(S.tree.parent)):
             _, R, w, _, alpha, a = records.body(b)
             store3(W.body_wrenches.force, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))
@@ -187,9 +188,10 @@ class JointReactions:
             apply_wrench(W, i, effort, neg(force), torque_F, F[0])
 
     def _efforts(self) -> list[np.ndarray]:
-        """Return the effort along every measured quantity: of forces, and of drivers whose laws depend on it.
+        """Return the effort along every measured quantity: of forces, and of rows whose laws depend on it.
 
-        The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier.
+        The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier; that of an
+        equation of a coupling is -f(t, s).
         """
         result, s = self._result, self._result.values.structure
         out = [result.records.zeros() for _ in s.measured]
@@ -199,11 +201,11 @@ class JointReactions:
                 out[m] = out[m] + effort
         for k, row in enumerate(s.rows):
             for slot in row.sensors:
-                out[slot] = out[slot] - result.multipliers[:, k] * self._slope(row.law, slot)
+                out[slot] = out[slot] - result.multipliers[:, k] * self.law_slope(row.law, slot)
         return out
 
-    def _slope(self, law: int, slot: int) -> np.ndarray:
-        """Return the derivative of a driver's law with respect to a sensor."""
+    def law_slope(self, law: int, slot: int) -> np.ndarray:
+        """Return the derivative of a row's law with respect to a sensor."""
         result, S = self._result, self._result.values.system
         sensed = result.measured.slots
         stack = np.zeros((result.values.structure.depth + 1 + STACK_RESERVE, 3), result.records.dtype)
@@ -444,9 +446,9 @@ class ImpulseReactions(JointReactions):
         for k, t in enumerate(s.terms):
             if not t.measured:
                 self._push(out, reacting_element(t).name, k, result.multipliers[:, t.row])
-        for row, x in enumerate(s.rows):  # drivers whose laws depend on measured quantities
+        for row, x in enumerate(s.rows):  # rows whose laws depend on measured quantities
             for slot in x.sensors:
-                self._along(out, x.element.name, slot, -result.multipliers[:, row] * self._slope(x.law, slot))
+                self._along(out, x.element.name, slot, -result.multipliers[:, row] * self.law_slope(x.law, slot))
         for name, (kind, at, impulse, *more) in applied_by_event(self._blows).items():
             if kind == "along":
                 self._along(out, name, at, impulse + result.records.zeros())

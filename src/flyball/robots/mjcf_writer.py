@@ -105,6 +105,8 @@ class _Writer:
         self.tags: dict[str, ET.Element] = {}  # by body
         self.root = ET.Element("mujoco", model=model.name)
         ET.SubElement(self.root, "compiler", angle="radian", autolimits="true")
+        if any(law is not None for law in model.gravity_laws()):
+            self.missing.append("the change of gravity with time")
         ET.SubElement(self.root, "option", gravity=numbers_text(self.values.system.gravity))
         self.places = self._drawn_joints()
         self.joint_tags: dict[int, ET.Element] = {}  # by row
@@ -370,6 +372,8 @@ class _Writer:
         if len(at) < len(c.coupled()):
             other = next(text for text in c.coupled() if self._row_of(text) is None)
             raise ModelError(f"{c.title} has no counterpart in MJCF: {other} is not the coordinate of a hinge or slide")
+        if c.equation(self.model) is not None:
+            raise ModelError(f"{c.title} has no counterpart in MJCF, which has linear relations of coordinates only")
         n = self.numbers[c.name]
         given = c.factors(n, self.model, self.poses.axis)
         factors, c0 = coupling_numbers(c, n, given, self.values.system.bodies.offset[at])

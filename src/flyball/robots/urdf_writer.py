@@ -215,7 +215,7 @@ class _Writer:
         """
         found: dict[str, tuple[str, str, float, float]] = {}
         reached = set[str]()
-        waiting = [c for c in self.model.couplings if len(c.coupled()) == 2]
+        waiting = [c for c in self.model.couplings if len(c.coupled()) == 2 and c.equation(self.model) is None]
         waiting = [c for c in waiting if all(self._drawn(x) is not None for x in c.coupled())]
         while waiting:
             c = next((c for c in waiting if len(reached & set(c.coupled())) == 1), waiting[0])

@@ -157,12 +157,12 @@ def laws_of_time(c: CompiledMechanism) -> Timed:
 
 
 def _find_laws_of_time(c: CompiledMechanism) -> Timed:
-    """Find the time-dependent laws among those of forces, rows, drivers, guards, corners and controllers."""
+    """Find the time-dependent laws among those of forces, rows, drivers, guards, corners, controllers and gravity."""
     S = c.system
     guards = S.guards.of[S.guards.kind == G_LAW]
     forces = S.forces.laws.ravel()
     corners = S.switches.law[S.switches.law >= 0]
-    starts = np.concatenate([forces, S.rows.law, S.tree.law, guards, corners, S.control_laws])
+    starts = np.concatenate([forces, S.rows.law, S.tree.law, guards, corners, S.control_laws, S.gravity_laws[:3]])
     return time_dependent_laws(S.code.tolist(), starts.tolist())
 
 

@@ -44,7 +44,7 @@ def refuse_out_of_table(a: Assembly, until: float) -> None:
     """
     c = a.compiled
     model = c.structure.model
-    tables = {x.name: x for x in model.tables}
+    tables = model.law_tables()
     if all(x.beyond != "refuse" for x in tables.values()):
         return
     env = model.environment(c.parameters)
@@ -155,7 +155,7 @@ def undefined_law_part(c: CompiledMechanism, element: Element, t: float, given: 
     s = c.structure
     values = {name: float(c.work.sensed.value[at]) for name, at in s.slots.items()}
     values |= dict(zip(s.model.parameters, c.values.system.const.tolist(), strict=False)) | {"t": t}
-    tables = {x.name: x for x in s.model.tables}
+    tables = s.model.law_tables()
     for owner, law, inputs in element_laws(s.model):
         if owner.name == element.name:
             known = values | dict(zip(inputs, given, strict=False))

@@ -19,6 +19,7 @@ from ..model.body import GROUND, Driver, Frame
 from ..model.controller import Sensor
 from ..model.element_laws import with_inputs
 from ..model.expressions import parameter_formulas
+from ..model.joint import Coupling
 from ..model.model import Model
 from ..model.quantities import single_quantity
 from ..numerics.integrators.butcher_tableaux import tableau
@@ -48,7 +49,8 @@ def model_with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[s
         raise ModelError(f"the input {repeated[0]!r} is named twice; leave one of them out")
     out, inputs = with_inputs(model, names)
     for x in inputs:
-        driven = [e.title for e, law, _ in element_laws(out) if isinstance(e, Driver) and x.parameter in law.names]
+        laws = ((e, law) for e, law, _ in element_laws(out) if isinstance(e, (Driver, Coupling)))
+        driven = [e.title for e, law in laws if x.parameter in law.names]
         if driven:
             raise ModelError(
                 f"{x.name!r} cannot be an input of a stepper: it sets the position of {driven[0]}, which would jump "
@@ -75,7 +77,8 @@ def _refuse_numbers(model: Model, name: str, parameter: str) -> None:
             f"{refusal}{what} depends on it by a number (a mass, a length, a stiffness), and inputs are read by laws "
             "only. Give a force or motor as input, or write the law with a parameter of its own"
         )
-    if not any(parameter in law.names for _, law, _ in element_laws(model)):
+    named = [law for _, law, _ in element_laws(model)] + [law for law in model.gravity_laws() if law is not None]
+    if not any(parameter in law.names for law in named):
         raise ModelError(f"{refusal}no law reads it")
 
 

@@ -78,7 +78,9 @@ class ClosureEquations:
         length = c.values.length
         self.scale = c.sizes
         units = {t.row: t.formula.measure for t in s.terms if not t.measured}
-        self.row_scale = np.array([1.0 / length if units[k] == "m" else 1.0 for k in range(len(s.rows))])
+        scales = {"m": 1.0 / length, "rad": 1.0}
+        levers = c.values.system.row_levers.real / length  # of equations of couplings, which have no terms
+        self.row_scale = np.array([scales[units[k]] if k in units else levers[k] for k in range(len(s.rows))])
         self.used = np.r_[np.arange(rows), drive]
         self.turning = bool(s.rows[drive].wrap)
         self.unit = 1.0 if self.turning or units[drive] != "m" else length  # unit of the driver's coordinate
@@ -321,7 +323,7 @@ def _stopped_driver(model: Model, d: Driver, t: float, env: Mapping[str, float])
     """Driver fixed at its value at time t; if its law depends on sensors, only t is fixed."""
     law = model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}", driver=True)
     if law.names <= {"t", *env}:
-        return replace(d, law=float(law.evaluate({**env, "t": t}, tables={x.name: x for x in model.tables})))
+        return replace(d, law=float(law.evaluate({**env, "t": t}, tables=model.law_tables())))
     return replace(d, law=re.sub(r"\bt\b", f"({t!r})", str(law)))
 
 
@@ -330,7 +332,7 @@ def _with_whole_turns(f: ReleasedMechanism, a: Assembly, value: float, t: float,
     law = f.model.law(f.driver.law, LawOf(f.unit), f"law of {f.driver.title}", driver=True)
     if f.unit != "rad" or not law.names <= {"t", *env}:
         return value
-    told = float(law.evaluate({**env, "t": t}, tables={x.name: x for x in f.model.tables}))
+    told = float(law.evaluate({**env, "t": t}, tables=f.model.law_tables()))
     return value + 2.0 * np.pi * np.round((told - value) / (2.0 * np.pi))
 
 

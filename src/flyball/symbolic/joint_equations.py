@@ -256,7 +256,7 @@ def joint_equations(
     for row in joint.rows(model.planar):
         par = [_parameter_expression(c) for c in joint.row_parameters(n, row, *ends)]
         data: list[Any] = []
-        if row.of_kind.place:
+        if row.of_kind.splines:
             curves = joint.curves(n)
             data = [float(c.real) for curve in curves for c in curve]
             par[1:3] = 0.0, float(len(curves[0]))

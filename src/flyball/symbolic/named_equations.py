@@ -28,7 +28,6 @@ import numpy as np
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
-from ..constraints.curve import point
 from ..constraints.registry import Kind
 from ..engine.kinematics import load_record, twist_column
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
@@ -49,7 +48,7 @@ from ..expression_graph.graph import (
 from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations, with_prescribed_rows
 from ..math.scalar import atan2
 from ..math.spline import BREAKS
-from ..math.vec import mtv, sub
+from ..math.vec import dot
 from ..model.body import Body, Driver, Frame
 from ..model.controller_signals import ConnectedState
 from ..model.element import Element
@@ -495,7 +494,7 @@ def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
     T = trace_equations(s, S, graph, wanted, drawn)
     own_q = [q - at for q, at in zip(T.q, drawn, strict=True)]
     places, feet = _curve_parameters(x, T)
-    new = [(foot, place.symbol) for foot, place in zip(feet, places, strict=True)]
+    new = list(feet)
     cleaned = _cleaner(x, T, own_q, more, new)
     lam = [*T.lam, *(graph.symbol(e) for e in names.lam[nr:])]
     T = _cleaned_arrays(with_prescribed_rows(T, lam, drawn), cleaned)
@@ -516,21 +515,21 @@ def _reference_values(S: Any, nq: int) -> list[Any]:
     return out
 
 
-def _curve_parameters(x: Values, T: TracedEquations) -> tuple[list[CurveParameter], list[Node]]:
-    """Curve parameters with their equations, and the nodes of the engine's iterations for them."""
+def _curve_parameters(x: Values, T: TracedEquations) -> tuple[list[CurveParameter], list[tuple[Node, Any]]]:
+    """Curve parameters with their equations, and the nodes of the engine's iterations with their symbols."""
     S, W = T.system, T.work
-    places, feet = [], []
+    places: list[CurveParameter] = []
+    feet: list[tuple[Node, Any]] = []
     for k, t in enumerate(x.structure.terms):
         kind = t.formula.of_kind
-        if kind.foot is None or kind.progress is None:
+        if kind.foot is None or kind.progress is None or kind.offset is None:
             continue
         F, M, par = load_record(W.frames, t.F), load_record(W.frames, t.M), row_parameters(S.term_parameters, k)
         symbol = T.z[S.terms.hint[k]]
-        p = mtv(F[1], sub(M[0], F[0]))
-        x0, x1, _, y0, y1, _ = point(par, symbol, S.const)
-        feet.append(kind.foot(par, F, M, symbol, S.const))
-        rate = kind.progress(par, F, M, symbol, S.const)[0]
-        places.append(CurveParameter(symbol, (p[0] - x0) * x1 + (p[1] - y0) * y1, rate, k))
+        feet.append((kind.foot(par, F, M, symbol, S.const), symbol))
+        if symbol not in [place.symbol for place in places]:  # of a row, others of the curve have the same
+            rate = kind.progress(par, F, M, symbol, S.const)[0]
+            places.append(CurveParameter(symbol, dot(*kind.offset(par, F, M, symbol, S.const)), rate, k))
     return places, feet
 
 
@@ -635,10 +634,10 @@ def nearest_curve_parameter(kind: Kind, par: tuple[float, ...], F: tuple, M: tup
     at = int(par[1])
     breaks = data[at + BREAKS : at + BREAKS + int(data[at + 1])]
     s = np.linspace(breaks[0], breaks[-1], CURVE_SAMPLES * len(breaks))
-    x, _, _, y, _, _ = point(par, s, data)
-    p = mtv(F[1], sub(M[0], F[0]))
-    guess = s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)]
     assert kind.foot is not None
+    assert kind.offset is not None
+    d = kind.offset(par, F, M, s, data)[0]
+    guess = s[np.argmin(dot(d, d))]
     return float(kind.foot(par, F, M, float(guess), data))
 
 
@@ -647,25 +646,26 @@ def generalised_forces(x: NamedEquations) -> list[tuple[str, np.ndarray]]:
     T = x.traced
     S, W = T.system, T.work
     W = W._replace(body_wrenches=W.body_wrenches.copy())
-    turning = _gathered_forces(S._replace(gravity=np.array([0.0] * 3, object)), W, None)
+    weightless = S._replace(gravity=np.array([0.0] * 3, object), gravity_laws=np.full(4, -1))
+    turning = _gathered_forces(weightless, W, T.t, False)
     out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
-    if any(c != 0.0 for c in S.gravity):
-        out.append(("Weight", _gathered_forces(S, W, None) - turning))
+    if any(c != 0.0 for c in S.gravity) or (S.gravity_laws >= 0).any():
+        out.append(("Weight", _gathered_forces(S, W, T.t, False) - turning))
     for k, e in enumerate(T.structure.forces):
         own = map_arrays(lambda _, x: x[k : k + 1], S.forces)  # noqa: B023
         one = S._replace(forces=own, force_parameters=S.force_parameters[k : k + 1], force_code=S.force_code[k : k + 1])
-        out.append((f"{e.name} ({type(e).__name__})", _gathered_forces(one, W, T.t)))
+        out.append((f"{e.name} ({type(e).__name__})", _gathered_forces(one, W, T.t, True)))
     return [(title, x.cleaned(f)) for title, f in out]
 
 
-def _gathered_forces(S: System, W: Work, t: Any) -> np.ndarray:
-    """Forces along the velocities: of inertia and weight, or of the elements in the tables."""
+def _gathered_forces(S: System, W: Work, t: Any, elements: bool) -> np.ndarray:
+    """Forces along the velocities: of inertia and weight, or of the ``elements`` in the tables."""
     f = np.empty(W.velocities.solved.shape[0], object)
     f[:] = 0.0
     W.body_wrenches[:] = 0.0
     rates = np.zeros(len(S.forces.F) + W.trial.size, object)
-    if t is None:
-        inertial_wrenches(S, W)
+    if not elements:
+        inertial_wrenches(S, W, t, rates)
         gather_forces(S, W, f)
         return f
     apply_forces(S, W, t, rates)

@@ -8,7 +8,7 @@ positions they are no constraints. Events add rows that actions lock and release
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,9 +31,10 @@ from ..model.contact_point import Touch
 from ..model.element import Element, LawOf
 from ..model.event import Event, Impulse, Lock, Release
 from ..model.event_validation import coordinate_of, lock_target
+from ..model.expression_parser import SyntaxNode
 from ..model.expressions import Expression
 from ..model.force import Force, Switch
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Coupling, Joint
 from ..model.model import Model
 from .forest import coordinate_row
 from .structure_definition import RowSpec, Structure, TermSpec, frame_index, integer_table
@@ -60,12 +61,7 @@ def add_constraint_rows(s: Structure, holds: Sequence[Initial]) -> None:
     for joint in s.model.joints:
         _add_joint_rows(s, joint)
     for coupling in s.model.couplings:
-        first = len(s.rows)
-        for k, text in enumerate(coupling.coupled()):
-            term = coordinate_term(s, text, coupling, first, with_turns=True)
-            term.index = k
-        s.rows.append(RowSpec(coupling, "coupling"))
-        s.slices[coupling.name] = slice(first, first + 1)
+        _add_coupling(s, coupling)
     for driver in s.model.drivers:
         _add_driver(s, driver)
     for hold in holds:
@@ -89,6 +85,26 @@ def _add_joint_rows(s: Structure, joint: Joint) -> None:
             coordinate_term(s, f"{joint.name}.{what}", joint, len(s.rows), with_turns=True)
         s.rows.append(RowSpec(joint, ("n" if row.world else "") + row.axes, holonomic=row.holonomic))
     s.slices[joint.name] = slice(first, len(s.rows))
+
+
+def coordinates_in_equations(model: Model) -> dict[str, Coupling]:
+    """Coordinates in equations of couplings, each with a coupling that uses it."""
+    return {text: e for e in model.couplings if e.equation(model) is not None for text in e.coupled()}
+
+
+def _add_coupling(s: Structure, e: Coupling) -> None:
+    first = len(s.rows)
+    s.slices[e.name] = slice(first, first + 1)
+    if (equation := e.equation(s.model)) is None:
+        for k, text in enumerate(e.coupled()):
+            coordinate_term(s, text, e, first, with_turns=True).index = k
+        s.rows.append(RowSpec(e, "coupling"))
+        return
+    # a row without terms of its own: its value is the law of the row with the reverse sign
+    law = s.law(replace(equation, tree=SyntaxNode("neg", (equation.tree,))), (), e, derivatives=True)
+    sensors = tuple(sorted({s.slots[text] for text in e.coupled()}))
+    work = s.state(f"{e.name}.work") if "t" in equation.names and not s.far else -1
+    s.rows.append(RowSpec(e, "coupling", law, work=work, sensors=sensors))
 
 
 def _add_driver(s: Structure, driver: Driver) -> None:
@@ -140,6 +156,8 @@ def coordinate_term(
     term = TermSpec(row, F, M, c.row, c.sign, e, owner, what, measured)
     if c.row.of_kind.turns and (with_turns or measured):
         term.hint = turn_state(s, owner, what, F, M)
+    elif c.row.of_kind.place:
+        term.hint = s.state(f"{owner.name}.place")
     s.terms.append(term)
     return term
 

@@ -78,6 +78,13 @@ def add_controller_laws(s: Structure) -> None:
             s.ordered += [(e, ordered, [s.law(input_law(s.model, e, name), ()) for name in ordered])]
 
 
+def add_gravity_laws(s: Structure) -> None:
+    """Compile the components of gravity that are laws of time, and number the state of the work of their changes."""
+    laws = [-1 if law is None else s.law(law, ()) for law in s.model.gravity_laws()]
+    work = s.state("gravity.work") if max(laws) >= 0 and not s.far else -1
+    s.tables["gravity_laws"] = np.array([*laws, work], np.int64)
+
+
 def initial_controller_states(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
     """Initial values of the controller states; ``numbers`` are those of elements, by name."""
     found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}
@@ -125,7 +132,7 @@ def _reading_terms(s: Structure, e: Element) -> list[int]:
 
 
 def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
-    """Laws of forces, controllers and drivers: (element, law, its inputs besides time)."""
+    """Laws of forces, controllers, couplings and drivers: (element, law, its inputs besides time)."""
     for x in controller_states(model):
         if not x.controller.sampled:
             yield x.controller, x.law, ()
@@ -135,6 +142,9 @@ def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str,
             for law in value if isinstance(value, tuple) else (value,):
                 if law is not None and not isinstance(law, float):
                     yield e, model.law(law, of, f"{name} of {e.title}"), of.inputs
+    for coupling in model.couplings:
+        if (equation := coupling.equation(model)) is not None:
+            yield coupling, equation, ()
     for driver in model.drivers:
         law = LawOf(model.unit(driver.coordinate, driver))
         yield driver, model.law(driver.law, law, f"law of {driver.title}", driver=True), ()
@@ -167,7 +177,7 @@ def steep_law_names(model: Model) -> list[str]:
 
 def _is_nonsmooth(model: Model, law: Expression) -> bool:
     """Whether a law has a nonsmooth point that needs a guard; tables with a smooth interpolation do not."""
-    smooth = {x.name for x in model.tables if not len(table_corners(np.array(x.data()), 0))}
+    smooth = {x.name for x in model.law_tables().values() if not len(table_corners(np.array(x.data()), 0))}
     if not law.tables or any(n.kind in _NONSMOOTH for n in law.tree.walk()):
         return True
     return bool(law.tables - smooth)
@@ -226,7 +236,7 @@ class NonsmoothPoints:
 
     def knot_guard_table(self, name: str) -> list[float] | None:
         """Table that is zero at each knot of another table, and only there; None if that has no such knots."""
-        table = next(x for x in self.s.model.tables if x.name == name)
+        table = self.s.model.law_tables()[name]
         data = np.array(table.data())
         x = table_corners(data, 0)
         if not len(x):

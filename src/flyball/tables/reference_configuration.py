@@ -117,7 +117,7 @@ class Poses:
     def __init__(self, s: Structure, given: ElementNumbers) -> None:
         self.s, self.numbers, self.bodies = s, given.of, given.bodies
         self.model = s.model
-        self._given = given
+        self._given, self.env = given, given.env
 
     def row(self, f: FrameSpec) -> np.ndarray:
         """Position (3) from the body's centre of mass and rotation (9), in body axes."""

@@ -252,7 +252,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     c = choices
     s = Structure(model, c.far, c.tree, c.positions or c.far, c.coupled)
     s.const = [0.0] * len(model.parameters)
-    for table in model.tables:
+    for table in model.law_tables().values():
         s.table_at[table.name] = len(s.const)
         s.const += table.data()
     law_inputs.add_controller_states(s)
@@ -265,7 +265,8 @@ def _built(model: Model, choices: Choices) -> Structure:
         constraint_rows.measure_released_rows(s)
     in_events = constraint_rows.event_names(model) if c.switches else {}
     outputs = {name: model[name] for name in c.outputs}
-    forces.measure_quantities(s, {**outputs, **law_inputs.controller_names(model), **in_events})
+    named = outputs | constraint_rows.coordinates_in_equations(model) | law_inputs.controller_names(model) | in_events
+    forces.measure_quantities(s, named)
     law_inputs.add_controller_slots(s)
     if c.switches:
         law_inputs.number_force_readings(s)
@@ -275,6 +276,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     forces.fill_force_table(s)
     forces.place_rotors(s)
     law_inputs.add_controller_laws(s)
+    law_inputs.add_gravity_laws(s)
     if c.switches:
         constraint_rows.add_event_guards(s)
     constraint_rows.fill_switch_tables(s)

@@ -169,7 +169,7 @@ class Structure:
 
     def add_table_derivatives(self, law: Expression) -> None:
         """Add derivatives of tables that a law calls to the constants."""
-        tables = {x.name: x for x in self.model.tables}
+        tables = self.model.law_tables()
         for node in law.tree.walk():
             if node.kind == "table" and node.value not in self.table_at:
                 name, order = called_table(node)
@@ -178,7 +178,7 @@ class Structure:
 
     def missed(self, stack: np.ndarray) -> TableFault | None:
         """Last law without a value due to a table, if one is recorded in the laws' scratch."""
-        tables = {x.name: x for x in self.model.tables}
+        tables = self.model.law_tables()
         return table_fault(stack, self.laws, {self.table_at[name]: tables[name.rstrip("'")] for name in self.table_at})
 
 

@@ -278,7 +278,8 @@ class System(NamedTuple):
     sizes: Sizes
     code: Int1  # bytecode of the laws
     const: Number1  # parameters, literals of the laws, splines
-    gravity: Number1  # (3,) [m/s^2]
+    gravity: Number1  # (3,) [m/s^2]; where a component is a law, its value at t = 0
+    gravity_laws: Int1  # (4,): law of each component, -1: constant; state of the work of their changes, -1: none
     scales: Scales
     units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
     velocity_units: Number1  # (nv,): the same of each coordinate whose rate is a velocity

@@ -22,7 +22,7 @@ from ..errors import ModelError
 from ..math.scalar import real_parts, sqrt
 from ..math.vec import inner_product
 from ..model.body import GROUND
-from ..model.expressions import number
+from ..model.expressions import Expression, number
 from ..model.joint import Coupling, Joint
 from ..model.model import Model
 from ..model.snapshot import ResultCache, exact_key
@@ -63,6 +63,7 @@ NO_LENGTH = 1e-13  # relative to the coordinates: a distance that is only roundi
 FACTOR_COLUMN = 7  # of `System.term_parameters`
 MAX_VALUES = 4  # sets of values of one structure that are cached
 REGULARISATION = 1e-9
+STEP = 1e-100  # complex step
 
 
 @dataclass
@@ -216,8 +217,8 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         scales=scales, units=np.array(_units(s, length), dtype),
         velocity_units=_velocity_units(s, length, dtype),
         rotor_inertia=_rotor_inertia(s, numbers, dtype),
-        row_levers=length / _row_units(s, terms, length),
-        entry_sizes=_entry_sizes(s, terms, _body_length(s, frames.position, length)),
+        row_levers=length / _row_units(s, terms, length, pose),
+        entry_sizes=_entry_sizes(s, terms, _body_length(s, frames.position, length), pose),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(
@@ -291,14 +292,43 @@ def _rotor_inertia(s: Structure, numbers: Mapping[str, SimpleNamespace], dtype: 
     return out
 
 
-def _row_units(s: Structure, terms: np.ndarray, length: Any) -> np.ndarray:
+def _row_units(s: Structure, terms: np.ndarray, length: Any, pose: Poses) -> np.ndarray:
     """Unit of every row: the largest of its terms', the length or a radian by its factor; the length if all are 0."""
     out = [0.0] * len(s.rows)
     for t, factor in zip(s.terms, terms[:, FACTOR_COLUMN], strict=True):
         if not t.measured:
             unit = (-factor if factor.real < 0.0 else factor) * (length if t.formula.measure == "m" else 1.0)
             out[t.row] = max(out[t.row], unit, key=lambda x: x.real)
+    for k, row in enumerate(s.rows):
+        if isinstance(row.element, Coupling) and (law := row.element.equation(s.model)) is not None:
+            out[k] = _equation_unit(s, law, length, pose)
     return np.array([unit if unit != 0.0 else length for unit in out], terms.dtype)
+
+
+def _equation_unit(s: Structure, law: Expression, length: Any, pose: Poses) -> float:
+    """Largest change of an equation's value where one coordinate changes by the length or a radian; 0 if none does.
+
+    It is linearised in the reference configuration; where all derivatives are 0 there, half a unit beside it.
+    """
+    env: dict[str, Any] = {name: x.real for name, x in pose.env.items()}
+    tables = s.model.law_tables()
+    units: dict[str, float] = {}
+    for t in s.terms:
+        name = f"{t.owner.name}.{t.what}" if t.measured and t.owner is not None else ""
+        if name in law.names:
+            units[name] = float(length.real) if t.formula.measure == "m" else 1.0
+            env[name] = float((t.sign * pose.term_value(t) + _offset(t, pose.numbers)).real)
+    found = 0.0
+    for beside in (0.0, 0.5):
+        near = env | {name: env[name] + beside * unit for name, unit in units.items()}
+        for name, unit in units.items():
+            with np.errstate(all="ignore"):
+                step = law.evaluate(near | {"t": 0.0, name: near[name] + 1j * STEP * unit}, tables)
+            slope = abs(np.imag(step)) / STEP
+            found = max(found, float(slope)) if np.isfinite(slope) else found
+        if found > 0.0:
+            break
+    return found
 
 
 def _body_length(s: Structure, places: np.ndarray, otherwise: Any) -> Any:
@@ -308,9 +338,9 @@ def _body_length(s: Structure, places: np.ndarray, otherwise: Any) -> Any:
     return longest if longest.real > 0.0 else otherwise
 
 
-def _entry_sizes(s: Structure, terms: np.ndarray, length: Any) -> np.ndarray:
+def _entry_sizes(s: Structure, terms: np.ndarray, length: Any, pose: Poses) -> np.ndarray:
     """Unit of the row by the unit of the velocity, for every entry of G; 0 for those of measured quantities."""
-    units = _row_units(s, terms, length)
+    units = _row_units(s, terms, length, pose)
     count = np.diff(s.tables["row_start"])[: len(units)]
     out = np.zeros(len(s.tables["column"]), terms.dtype)
     of_rows = s.tables["column"][: count.sum()]
@@ -349,30 +379,33 @@ def _term_parameters(
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
     numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
-    factors = {name: f / f[0] for name, f in factors.items()}
+    factors = {name: f / f[0] for name, f in factors.items() if len(f)}
     for k in refresh.rows(s, "terms"):
         t = s.terms[k]
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
         n = numbers[e.name]
+        if t.formula.of_kind.splines and t.owner is not None:
+            x[k, 1:3] = curve_at[t.owner.name], curve_at[t.owner.name] + len(t.owner.curves(numbers[t.owner.name])[0])
         if t.hint >= 0 and t.formula.of_kind.turns:
             x[k, 0] = 1.0
         if isinstance(e, Joint) and t.owner is None:
             x[k, :7] = e.row_parameters(n, t.formula, *pose.ends(e))
-            if t.formula.of_kind.place:
+            if t.formula.of_kind.splines:
                 at = curve_at[e.name]
                 x[k, 1:3] = at, at + len(e.curves(n)[0])
         elif isinstance(e, Joint):
             x[k, 7] *= e.weight(n, t.what, *pose.ends(e))
-        elif isinstance(e, Coupling):
+        elif isinstance(e, Coupling) and not t.measured:
             x[k, 7] *= factors[e.name][t.index]
             x[k, 6] = _coupling_constant(e, n, t, pose)
         elif t.owner is not None:
             if t.switch is not None and (weights := e.switch_weights(n, t.switch)):
                 x[k, 7] *= weights[t.index]
             held = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
-            x[k, 6] = _coupling_constant(e, n, t, pose) if hasattr(e, "total") else held
+            weighted = hasattr(e, "total") and not isinstance(e, Coupling)
+            x[k, 6] = _coupling_constant(e, n, t, pose) if weighted else held
     return x
 
 

@@ -404,6 +404,9 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
             yield RecordedCurve(e.name, F.body, F.p + outline @ F.R.T, closed)
         radius = float(getattr(numbers, "radius", None) or 0.0)
         yield _joint_symbol(e, "roller" if radius else "point", M, F, places, (radius,))
+    elif kind == "curve":
+        yield RecordedCurve(e.name, F.body, F.p + e.outline(numbers) @ F.R.T, numbers.closed)
+        yield _joint_symbol(e, "point", M, F, places)
     elif kind == "knife_edge":
         yield _joint_symbol(e, "knife_edge", M, F, places)
     else:

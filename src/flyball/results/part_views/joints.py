@@ -12,7 +12,7 @@ from ...math.scalar import atan2, rounded
 from ...math.vec import mtv, sub
 from ...model.controller_signals import signal_law
 from ...tables.forest import coordinate_row
-from ..motion_record import FULL_TURN, Wrench, measured_coordinate
+from ..motion_record import FULL_TURN, Wrench, curve_places, gravity_over_time, measured_coordinate
 from .base import PartView, components_array
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ class JointView(PartView):
         """Return a coordinate, its rate and, if ``solved``, its acceleration, by the row that measures it."""
         e = self.element
         records = self._result.records if solved else self._result.motions
-        turns = self._turns(what) if e.coordinates[what].row.of_kind.turns else None
+        kind = e.coordinates[what].row.of_kind
+        turns = curve_places(self._result, e) if kind.place else self._turns(what) if kind.turns else None
         value, rate, second = measured_coordinate(records, e, what, turns)
         return value + e.offset(self._x.numbers[e.name], what), rate, second
 
@@ -136,7 +137,11 @@ class CouplingView(PartView):
     def effort(self, coordinate: str) -> np.ndarray:
         """Return the force [N] or torque [N m] of the coupling on one of its coordinates, along it."""
         s, S = self._x.structure, self._x.system
-        for k in s.terms_of[self.element.name]:
+        row = s.rows[s.slices[self.element.name].start]
+        if row.law >= 0 and coordinate in self.element.coupled():
+            slope = self._result.reactions.law_slope(row.law, s.slots[coordinate])
+            return -slope * self._result.multipliers[:, s.slices[self.element.name].start]
+        for k in s.terms_of.get(self.element.name, ()):
             t = s.terms[k]
             if f"{t.owner.name}.{t.what}" == coordinate:
                 return self._result.multipliers[:, t.row] * S.term_parameters[k, COEFFICIENT] / t.sign
@@ -144,7 +149,9 @@ class CouplingView(PartView):
         raise ModelError(f"{self.element.title} does not couple {coordinate!r}; it couples {has}")
 
     def _found(self, name: str) -> np.ndarray:
-        """Return ``effort_1``, ``effort_2`` ... on its coordinates, in order."""
+        """Return ``effort_1``, ``effort_2`` ... on its coordinates, in order, or the work of an equation of time."""
+        if name == "work":
+            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.work"]]
         return self.effort(list(self.element.coupled())[int(name.removeprefix("effort_")) - 1])
 
 
@@ -161,7 +168,7 @@ class ControllerView(PartView):
         sensed = self._result.measured.slots
         env: dict[str, Any] = {"t": self._result.t, **self._x.env}
         env |= {k: sensed[0, m] for k, m in s.slots.items()}
-        return law.evaluate(env, {x.name: x for x in s.model.tables}) + self._result.records.zeros()
+        return law.evaluate(env, s.model.law_tables()) + self._result.records.zeros()
 
 
 class SensorView(PartView):
@@ -188,7 +195,7 @@ class IMUView(PartView):
     def specific_force(self) -> np.ndarray:
         """Acceleration of its origin minus gravity, along its own axes [m/s^2], (n, 3)."""
         _, R, _, _, _, a = self._axes()
-        gravity = tuple(self._x.system.gravity)
+        gravity = gravity_over_time(self._result)
         return np.stack(mtv(R, sub(a, gravity)), axis=1)
 
     @property

@@ -388,7 +388,7 @@ def event_expression(here: EventContext, g: int) -> float:
     law = here.structure.cache.get(
         "law of event", g, MOST_EXPRESSIONS, lambda: model.law(e.law, e.of, f"when of {e.title}")
     )
-    return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
+    return float(law.evaluate(here.names(), model.law_tables()))
 
 
 def event_expressions(here: EventContext) -> dict[int, float]:
@@ -465,7 +465,7 @@ def _evaluated_argument(here: EventContext, e: Event, a: Action, what: str, law:
     """Return the value of an action's expression at the instant, before any action."""
     model = here.structure.model
     of = LawOf(_unit_of_argument(here, e, a, what), curves=True)
-    tables = {x.name: x for x in model.tables}
+    tables = model.law_tables()
     value = model.law(law, of, f"{what} of {a.title} in {e.title}").evaluate(here.names(), tables)
     if not np.isfinite(value):
         raise SimulationError(

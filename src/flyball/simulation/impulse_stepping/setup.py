@@ -227,10 +227,14 @@ def partition_bodies(model: Model, values: Values) -> BodyPartition:
     frames = np.concatenate([S.terms.F, S.terms.M, S.forces.F[between], S.forces.M[between]])
     used = set(S.frame_body[frames[frames >= 0]].tolist())
     place = values.structure.place
-    free = tuple(b.name for b in model.bodies if place[b.name] not in used)
-    return BodyPartition(
-        (*free, *(b.name for b in model.bulk)), tuple(b.name for b in model.bodies if place[b.name] in used)
-    )
+    changing = bool((S.gravity_laws >= 0).any())
+    if changing and model.bulk:
+        raise ModelError(
+            f"{model.bulk[0].title}: sets of bodies need constant gravity, and that of {model.name!r} is a law of "
+            f"time; add each body as a Body"
+        )
+    held = tuple(b.name for b in model.bodies if changing or place[b.name] in used)
+    return BodyPartition((*(b.name for b in model.bodies if b.name not in held), *(b.name for b in model.bulk)), held)
 
 
 StopBounds = tuple[float, float, float]
