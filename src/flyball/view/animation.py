@@ -22,6 +22,7 @@ from .motion_with_events import add_event_states
 from .page import animation_page
 from .playback import Playback, playback_of
 from .recording import (
+    MIN_GROUPED,
     SHOW_OPTIONS,
     Channel,
     Compared,
@@ -34,8 +35,9 @@ from .recording import (
     RecordedLine,
     RecordedPath,
     Recording,
+    group_bodies,
 )
-from .scene import contact_arrows, force_arrows, ground_bodies, recorded_sets, rope_ends
+from .scene import body_poses, contact_arrows, force_arrows, ground_bodies, recorded_sets, rope_ends
 from .symbols import AttachedFrames, GearWheel, SymbolPart, coordinate_spring_line, element_symbols, float_triple
 
 if TYPE_CHECKING:
@@ -78,7 +80,7 @@ def attachment_text(e: Any) -> str:
 
 
 MAX_TIMES = 2000  # approximate number of times in a recording
-MAX_SET_POSES = 1_500_000  # largest number of poses of set members in a recording
+MAX_POSES = 1_500_000  # largest number of poses of many bodies in a recording
 MAX_CURVES = 60
 DEFAULT_SHOW = ("loads", "moments", "grid")
 
@@ -120,7 +122,7 @@ def animation_html(
         measured curves are not as `Result.compare` needs them.
     """
     return animation_page(
-        record_comparison(result, paths=paths, show=show, others=others, label=label, measured=measured)
+        group_bodies(record_comparison(result, paths=paths, show=show, others=others, label=label, measured=measured))
     )
 
 
@@ -209,21 +211,21 @@ def record_motion(
         raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to plot")
     motion = result
     result, every, near, instead = motion_to_show(motion)
-    members = sum(map(len, result.bulk.values()))
+    members = _member_count(result)
     places = AttachedFrames(result)
     looks = BodyShapes(result, places)
     drawn = list(_symbols_and_lines(result, places, looks, every))
     channels = _recorded_channels(result, every) if curves else ()
     bodies = tuple(
-        RecordedBody(b.name, looks.shapes(b.name), *_body_poses(result, b.name, every), b.color)
-        for b in result.model.bodies
+        RecordedBody(b.name, looks.shapes(b.name), p, q, b.color)
+        for b, (p, q) in zip(result.model.bodies, body_poses(result, every), strict=True)
     )
     joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
     sets = recorded_sets(result, every)
     contacts, left_out = contact_arrows(motion, near) if curves else (None, "")
     notes = dict(motion.health.lines()) if with_notes else {}
     if len(every) < len(result.t) and members:
-        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
+        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies"
     if left_out:
         notes["contact arrows"] = left_out
     playback = playback_of(result, every) if with_notes else Playback()
@@ -268,18 +270,24 @@ class DisplayedMotion(NamedTuple):
 
 def motion_to_show(result: Result) -> DisplayedMotion:
     """Return the displayed motion, with all states around events."""
-    chosen = thinned_times(len(result.t), sum(map(len, result.bulk.values())))
+    chosen = thinned_times(len(result.t), _member_count(result))
     whole, near, more = add_event_states(result)
     every = np.flatnonzero(more | np.isin(near, chosen))
     return DisplayedMotion(whole, every, near[every], np.flatnonzero(~more)[near[every]])
 
 
+def _member_count(result: Result) -> int:
+    """Return the number of bodies in sets, and of single bodies if they are many."""
+    single = len(result.model.bodies)
+    return sum(map(len, result.bulk.values())) + (single if single > MIN_GROUPED else 0)
+
+
 def thinned_times(n: int, members: int = 0) -> np.ndarray:
     """Return the indices of the displayed times: all, or about 2000 evenly chosen, including first and last.
 
-    Fewer if sets have so many members that the page would become too large.
+    Fewer if there are so many bodies that the page would become too large.
     """
-    most = max(2, min(MAX_TIMES, MAX_SET_POSES // max(members, 1)))
+    most = max(2, min(MAX_TIMES, MAX_POSES // max(members, 1)))
     return np.arange(n) if n <= most * 1.25 else np.unique(np.linspace(0, n - 1, most).round().astype(int))
 
 
@@ -295,17 +303,6 @@ def _gravity_direction(result: Result) -> tuple[float, float, float]:
     g = np.asarray(result.values.system.gravity).real
     size = float(np.sqrt(g @ g))
     return float_triple(g / size if size > 0.0 else g)
-
-
-def _body_poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and quaternion of a body's reference frame."""
-    view = result[name]
-    p = np.zeros((len(every), 3))
-    p[:, : 2 if result.planar else 3] = view.position[every]
-    if not result.planar:
-        return p, view.quaternion[every]
-    half = 0.5 * view.angle[every]
-    return p, np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
 
 
 def _symbols_and_lines(
@@ -403,11 +400,9 @@ def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]
         for e in _parts_with_curves(result):
             if len(curves) >= MAX_CURVES:
                 break
-            curves |= {
-                f"{e.name}.{k}": c
-                for k, c in result[e.name].channels().items()
-                if _is_main_curve(f"{e.name}.{k}", result)
-            }
+            view = result[e.name]
+            main = [k for k, x in view.names.items() if x.curve and _is_main_curve(f"{e.name}.{k}", result)]
+            curves |= {f"{e.name}.{k}": view.quantity(k) for k in main}
         names = list(curves)[:MAX_CURVES]
     return tuple(Channel(k, curves[k][0], np.asarray(curves[k][1], float)[every]) for k in names)
 

@@ -80,7 +80,7 @@ export function motionPoints(recording, unit) {
     const n = columns.length / 3;
     for (const i of sampleNumbers(n, 24)) target.push(pointAt(columns, { i, j: i, f: 0 }, new THREE.Vector3()));
   }
-  points.push(...crowdPoints(recording));
+  for (const point of crowdPoints(recording)) points.push(point);
   const ends = lines.flatMap((line) => line.points);
   const each = [...own.values()].reduce((sum, list) => sum + list.length, 1) + ends.length;
   const pose = new THREE.Group();
