@@ -18,6 +18,7 @@ from ..model.model import suggest
 from .body_shapes import BodyShapes
 from .comparison_tables import difference_tables, measurement_table
 from .event_marks import event_marks
+from .figures import initial_channels
 from .motion_with_events import add_event_states
 from .page import animation_page
 from .playback import Playback, playback_of
@@ -237,7 +238,7 @@ def record_motion(
         lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
         joints=joints,
         channels=channels,
-        plotted=initial_channels(result, [c.name for c in channels]),
+        plotted=initial_channels(result, channels),
         size=looks.size,
         notes=notes,
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
@@ -427,28 +428,6 @@ def _main_curves(names: list[str], result: Result) -> list[str]:
     rank = {k: (not _is_main_curve(k, result), i) for i, k in enumerate(names)}
     chosen = set(sorted(names, key=rank.__getitem__)[:MAX_CURVES])
     return [k for k in names if k in chosen]
-
-
-def initial_channels(result: Result, names: Collection[str]) -> tuple[str, ...]:
-    """Return the curves shown when a page opens.
-
-    They are sensors; reference, response and output of controllers; efforts of drivers; a joint coordinate of each kind
-    (else a position); energies.
-    """
-    m = result.model
-    measured = [f"{s.name}.value" for s in m.sensors][:2]
-    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown together
-    kinds: dict[str, str] = {}
-    for j in m.joints:
-        for k, c in j.coordinates.items():
-            if f"{j.name}.{k}" in set(names) - compared:
-                kinds.setdefault(c.unit, f"{j.name}.{k}")
-    told = [f"{c.name}.{k}" for c in m.controllers[:1] for k in c.compared]
-    told += [f"{c.name}.{c.output_names[0]}" for c in m.controllers][:2]
-    efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
-    first = [*measured, *told, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
-    energies = ("energy.kinetic", "energy.potential", "energy.total")
-    return (*(k for k in first if k in names), *(k for k in energies if k in names))
 
 
 def equilibrium_page(found: Equilibrium) -> str:

@@ -233,7 +233,7 @@ def _shape_data(shape: Shape, block: _NumberBlock) -> dict[str, object]:
         "position": _float_list(shape.position),
     }
     out |= {"quaternion": _float_list(shape.quaternion), "outline": [_float_list(point) for point in shape.outline]}
-    out["hole"] = bool(shape.hole)
+    out |= {"hole": bool(shape.hole), "link": bool(shape.link)}
     if shape.vertices is not None and shape.triangles is not None:
         kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
         return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}

@@ -28,7 +28,7 @@ class Shape:
     ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness), ``mesh`` (no size;
     ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside).
 
-    A ``hole`` is drawn as a dark opening in the body's other shapes.
+    A ``hole`` is drawn as a dark opening in the body's other shapes; a ``link`` joins them to a joint.
     """
 
     kind: str
@@ -39,6 +39,7 @@ class Shape:
     vertices: np.ndarray | None = None
     triangles: np.ndarray | None = None
     hole: bool = False
+    link: bool = False
 
 
 def scaled_shape(shape: Shape, factor: float) -> Shape:
@@ -53,17 +54,28 @@ def scaled_shape(shape: Shape, factor: float) -> Shape:
     )
 
 
+def shape_box(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Return the low and high corners of the box around a shape, in the shape's own axes [m]."""
+    if shape.kind == "mesh":
+        points = np.asarray(shape.vertices, float)
+        return points.min(axis=0), points.max(axis=0)
+    if shape.kind == "plate":
+        points, half = np.array(shape.outline), 0.5 * shape.size[0]
+        return np.r_[points.min(axis=0), -half], np.r_[points.max(axis=0), half]
+    if shape.kind == "box":
+        high = 0.5 * np.array(shape.size)
+    elif shape.kind in ("sphere", "ellipsoid"):
+        high = np.broadcast_to(shape.size, 3).astype(float)
+    else:
+        radius, length = shape.size
+        high = np.array([radius, radius, 0.5 * length + (radius if shape.kind == "capsule" else 0.0)])
+    return -high, high
+
+
 def half_extent(shape: Shape) -> float:
     """Return about half the largest length of a shape [m]."""
-    if shape.kind == "mesh":
-        return 0.5 * float(np.ptp(np.asarray(shape.vertices), axis=0).max(initial=0.0))
-    if shape.kind == "plate":
-        return 0.5 * float(np.ptp(np.array(shape.outline), axis=0).max())
-    round_ones = {"sphere": 1.0, "ellipsoid": 1.0, "box": 0.5}
-    if shape.kind in round_ones:
-        return round_ones[shape.kind] * max(shape.size)
-    radius, length = shape.size
-    return max(radius, 0.5 * length + (radius if shape.kind == "capsule" else 0.0))
+    low, high = shape_box(shape)
+    return 0.5 * float((high - low).max())
 
 
 @dataclass(frozen=True)

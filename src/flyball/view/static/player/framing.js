@@ -18,6 +18,12 @@ function bodyPoints(body, planar) {
 
 /** Symbols reach a little around their joint, wheels by their radius. */
 function jointPoints(joint, unit, planar) {
+  if (joint.kind === "rack") {
+    const [w, x, y, z] = joint.quaternion;
+    const turn = new THREE.Quaternion(x, y, z, w);
+    const ends = [joint.reach[0] - joint.size[1], joint.reach[1] + joint.size[1]];
+    return ends.map((end) => new THREE.Vector3(end, 0, 0).applyQuaternion(turn).add({ x: joint.position[0], y: joint.position[1], z: joint.position[2] }));
+  }
   const bodily = ["wheel", "ball", "gear"].includes(joint.kind) ? joint.size[0] : 0;
   const reach = Math.max(0.1 * unit * joint.scale, bodily);
   const signs = [-1, 1];

@@ -1,5 +1,6 @@
 // Solids of spatial bodies: one geometry for each kind of shape, edges softened so that they catch the light.
 import * as THREE from "three";
+import { sinks, THEMES } from "./theme.js";
 
 const FEW = 300; // bodies up to which shapes and symbols are fine
 /** Sides of what is round: fewer where bodies are many. */
@@ -107,6 +108,20 @@ function spinMarks({ kind, size }, material) {
   return [mark];
 }
 
+const EDGE = 0.012; // width of the edge around a dark shape, as part of its size
+
+/** A lighter shell around a shape, of which only the inside is seen: an edge all around. */
+function shell(geometry, material) {
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
+  const size = geometry.boundingBox.getSize(new THREE.Vector3());
+  const middle = geometry.boundingBox.getCenter(new THREE.Vector3());
+  const width = 2 * EDGE * size.length();
+  const mesh = new THREE.Mesh(geometry, material);
+  mesh.scale.set(...size.toArray().map((x) => 1 + width / Math.max(x, 1e-12)));
+  mesh.position.copy(middle).sub(middle.clone().multiply(mesh.scale));
+  return mesh;
+}
+
 /** A spatial body: a group of lit meshes. */
 export function solidBody(body, colour) {
   const group = new THREE.Group();
@@ -117,16 +132,26 @@ export function solidBody(body, colour) {
   dark.color.multiplyScalar(0.3);
   const opening = new THREE.MeshStandardMaterial({ color: colour, roughness: 1 });
   opening.color.multiplyScalar(0.12);
+  const shells = [];
+  const light = new THREE.MeshBasicMaterial({ side: THREE.BackSide });
   for (const shape of body.shapes) {
     const holder = placed(new THREE.Group(), shape);
     if (shape.hole) {
       holder.add(new THREE.Mesh(solidGeometry(shape), opening));
       holder.children[0].scale.setScalar(PROUD);
-    } else holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
+    } else {
+      const mesh = new THREE.Mesh(solidGeometry(shape), material);
+      holder.add(mesh, ...spinMarks(shape, dark));
+      if (!glass && sinks(colour, THEMES.dark)) shells.push([holder, shell(mesh.geometry, light)]);
+    }
     group.add(holder);
   }
   group.traverse((object) => Object.assign(object, { castShadow: !glass, receiveShadow: !glass }));
-  return { group, retheme() {}, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
+  const retheme = (theme) => {
+    light.color.set(theme.steel);
+    for (const [holder, mesh] of shells) sinks(colour, theme) ? holder.add(mesh) : mesh.removeFromParent();
+  };
+  return { group, retheme, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
 }
 
 /** Points that enclose a shape, in the body's axes: the corners of its box. */
