@@ -12,7 +12,7 @@ import xarray as xr
 import flyball as fb
 from flyball.results.contacts import CONTACT_COLUMNS
 from flyball.results.health import ContactHealth
-from flyball.view.animation import MAX_SET_POSES, record_motion, thinned_times
+from flyball.view.animation import MAX_POSES, record_motion, thinned_times
 from flyball.view.recording import Figure, PointPaths
 from flyball.view.result_plots import standard_pictures, write_pictures
 from tests.results.made_up import thrown
@@ -129,7 +129,7 @@ def test_contact_forces_are_drawn_on_what_moves() -> None:
 def test_pictures_of_very_many_bodies_are_fewer() -> None:
     assert len(thinned_times(61, 1000)) == 61
     few = thinned_times(401, 100_000)
-    assert (few[0], few[-1], len(few)) == (0, 400, MAX_SET_POSES // 100_000)
+    assert (few[0], few[-1], len(few)) == (0, 400, MAX_POSES // 100_000)
 
 
 def test_health_says_what_went_wrong_with_contacts() -> None:

@@ -18,7 +18,7 @@ import xarray as xr
 
 import flyball as fb
 from flyball.results import files
-from flyball.results.files import data_checksum, read_group, text_type
+from flyball.results.files import data_checksum, read_group, text_type, write_table
 from flyball.results.result import Result
 from tests.results.made_up import slider_crank
 
@@ -112,6 +112,15 @@ def test_the_table(result: Result, tmp_path: Path) -> None:
     table = np.array(rows, float)
     assert (table[:, header.index("slider.x [m]")] == result["slider.x"]).all()
     assert (table[:, 0] == result.t).all()
+
+
+def test_numbers_of_a_table_are_exact(tmp_path: Path) -> None:
+    numbers = np.array([0.1, -0.0, 1e-7, 1e22, 5e-324, np.pi, np.nan, np.inf, -np.inf])
+    write_table(tmp_path / "t.csv", ["a, b", "c"], [numbers, 3.0 * numbers])
+    with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["a, b", "c"]
+    np.testing.assert_array_equal(np.array(rows, float), np.stack([numbers, 3.0 * numbers], axis=1))
 
 
 def test_what_is_no_result_is_refused(result: Result, tmp_path: Path) -> None:

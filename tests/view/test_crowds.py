@@ -17,7 +17,15 @@ from flyball.view.page import (
     pack_positions,
     pack_recording,
 )
-from flyball.view.recording import RecordedBody, RecordedContacts, RecordedSet, Recording, Shape
+from flyball.view.recording import (
+    RecordedBody,
+    RecordedContacts,
+    RecordedPath,
+    RecordedSet,
+    Recording,
+    Shape,
+    group_bodies,
+)
 from tests.view.conftest import Opened
 
 Open = Callable[..., Opened]
@@ -137,6 +145,27 @@ def test_members_have_names_and_can_be_chosen(opened: Open) -> None:
     assert tab.locator(".card h2").inner_text() == "balls[5]"
     assert tab.locator(".subtitle").inner_text().startswith("16 bodies")
     assert tab.locator(".legend li").first.inner_text() == "balls (16)"
+    assert tab.errors == []
+
+
+def test_many_single_bodies_are_drawn_as_sets(opened: Open) -> None:
+    s = rolling(500, 5).sets[0]
+    names = [f"{'ball' if k % 2 else 'brick'} {k}" for k in range(500)]
+    box = Shape("box", (RADIUS, RADIUS, RADIUS))
+    bodies = [RecordedBody(x, (s.shapes[0] if k % 2 else box,), s.p[:, k], s.q[:, k]) for k, x in enumerate(names)]
+    path = RecordedPath("path", "ball 7")
+    whole = Recording("many", False, rolling(500, 5).t, tuple(bodies), paths=(path,), size=0.3)
+    grouped = group_bodies(whole)
+    assert [b.name for b in grouped.bodies] == ["ball 7"]  # something is fixed on it
+    assert [(x.name, len(x.names)) for x in grouped.sets] == [
+        ("brick 0 ... brick 498", 250),
+        ("ball 1 ... ball 499", 249),
+    ]
+    tab = opened(animation_page(grouped))
+    x, y = tab.evaluate("flyball.pixel('brick 498')")
+    assert tab.evaluate("([x, y]) => flyball.pick(x, y)", [x, y]) == "brick 498"
+    shown = np.array(tab.evaluate("flyball.poses('brick 0 ... brick 498')"))
+    np.testing.assert_allclose(shown[:, :3], s.p[0, ::2], atol=1e-3 * RADIUS)
     assert tab.errors == []
 
 

@@ -139,6 +139,45 @@ def test_a_rack_touches_its_pinion_where_they_move_alike(radius: float) -> None:
     assert bar.reach[0] <= -0.15 * 4 + 1e-6 or bar.reach[1] >= 0.15 * 4 - 1e-6  # long enough for 4 rad
 
 
+def test_a_rack_is_joined_to_its_guide() -> None:
+    m = fb.Mechanism("rack", planar=True)
+    m.add(body("pinion", (0, 0.3)), body("bar", (0, 0)))
+    m.add(fb.Revolute("P", "ground", "pinion", at=(0, 0.3)), fb.Prismatic("G", "ground", "bar", at=(0, 0), axis=(1, 0)))
+    m.add(fb.RackAndPinion("R", pinion="P", rack="G", radius=0.1), fb.Initial("G.displacement", rate=0.5))
+    r = moved(m)
+    block, link = next(b for b in r.bodies if b.name == "bar").shapes
+    np.testing.assert_allclose(block.position, 0.0, atol=1e-12)
+    assert link.link
+    assert np.hypot(*link.position[:2]) == pytest.approx(link.size[1] / 2)  # it begins at the guide
+    assert 0.2 - 4.2 * 2 * 0.1 / 18 < 2 * link.position[1] < 0.2  # and ends in the rack, whose pitch line is at 0.2
+
+
+def test_a_shape_that_stands_away_from_its_joint_is_joined_to_it() -> None:
+    m = fb.Mechanism("pendulum", gravity=(0, 0, -9.81))
+    m.add(fb.Body("bob", shape=fb.Sphere(radius=0.1), density=1000, position=(0, 0, -1)))
+    m.add(fb.Body("arm", shape=fb.Rod(radius=0.05, start=(0, 0, 0), end=(1, 0, 0)), density=1000))
+    m.add(fb.Revolute("A", "ground", "bob", at=(0, 0, 0), axis=(0, 1, 0)))
+    m.add(fb.Revolute("B", "ground", "arm", at=(0, 0, 0), axis=(0, 1, 0)))
+    shapes = {b.name: b.shapes for b in moved(m).bodies}
+    assert [s.link for s in shapes["arm"]] == [False]
+    ball, link = shapes["bob"]
+    assert link.link
+    assert link.position[2] + link.size[1] / 2 == pytest.approx(ball.position[2] + 1.0)  # at the joint
+    assert abs(link.position[2] - link.size[1] / 2 - ball.position[2]) < 0.1  # in the ball
+
+
+def test_what_moves_and_was_asked_for_is_plotted_first() -> None:
+    m = fb.load("examples/slider_crank.toml")  # the crank turns steadily, and is driven
+    assert moved(m).plotted[:3] == ("motor.effort", "C.angle", "D.displacement")
+    two = fb.Mechanism("two pendulums and a wheel", planar=True, gravity=(0, -9.81))
+    for k, name in enumerate(("wheel", "still", "asked", "swings", "more")):
+        two.add(body(name, (k, 0 if k == 0 else -1)), fb.Revolute(f"{name} pin", "ground", name, at=(k, 0)))
+    two.add(fb.Initial("wheel pin.angle", rate=5.0), fb.Initial("asked pin.angle", value=0.1))
+    two.add(fb.Initial("still pin.angle", value=0.0), fb.PointForce("push", "swings", force=("sin(3*t)", 0.0)))
+    assert moved(two, 6.0).plotted[0] == "asked pin.angle"
+    assert "wheel pin.angle" not in moved(two, 6.0).plotted
+
+
 def test_bevel_gears_are_discs_that_touch() -> None:
     m = fb.Mechanism("bevel")
     m.add(body("a", (0, 0, 0.3)), fb.Revolute("A", "ground", "a", at=(0, 0, 0.3), axis=(0, 0, 1)))

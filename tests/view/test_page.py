@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,25 @@ def test_a_body_can_be_hidden_and_traced(opened: Open) -> None:
     tab.settle()
     assert tab.locator(".stage").screenshot() != before
     assert tab.errors == []
+
+
+def test_the_legend_lists_what_is_seen(opened: Open) -> None:
+    r = spatial()
+    bare = dataclasses.replace(r.bodies[0], name="bare", shapes=())
+    tab = opened(animation_page(dataclasses.replace(r, bodies=(*r.bodies, bare))))
+    names = tab.locator(".legend li:not([hidden]) .name").all_text_contents()
+    assert names == [b.name for b in r.bodies]
+
+
+def test_dark_bodies_have_an_edge_on_dark_ground(opened: Open) -> None:
+    r = spatial()
+    dark = dataclasses.replace(r, bodies=tuple(dataclasses.replace(b, color="#15191e") for b in r.bodies))
+    calls = {}
+    for theme in ("light", "dark"):
+        tab = opened(animation_page(dark), f"t=0&theme={theme}")
+        tab.settle()
+        calls[theme] = tab.evaluate("flyball.drawn().calls")
+    assert calls["dark"] > calls["light"]
 
 
 def test_address_gives_time_and_theme(opened: Open) -> None:

@@ -110,6 +110,16 @@ def test_light_and_dark(opened: Open, result: Result, scheme: str) -> None:
     assert tab.errors == []
 
 
+@pytest.mark.parametrize("width", [320, 390])
+def test_on_a_phone_the_tools_lie_beside_one_another(opened: Open, width: int) -> None:
+    tab = opened(fb.load(EXAMPLES / "governor.toml").simulate(0.1, outputs=11).report())
+    tab.set_viewport_size({"width": width, "height": 844})
+    tab.settle()
+    views, legend = (tab.locator(k).first.bounding_box() for k in (".views", ".legend > button"))
+    assert views["y"] + views["height"] <= legend["y"]
+    assert tab.errors == []
+
+
 def test_the_page_scrolls_and_keys_are_the_picture_s_only_when_it_is_meant(opened: Open, result: Result) -> None:
     tab = opened(result.report(), "t=0.3&show=")
     tab.mouse.move(5, 5)

@@ -18,7 +18,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 TEXTS_VARIABLE, NUMBERS_VARIABLE = "texts", "numbers"
-ROWS_AT_ONCE = 4096  # rows of a table whose numbers are Python objects at the same time
+ROWS_AT_ONCE = 512  # rows of a table whose numbers are Python objects at the same time
 MAX_CONCATENATED = 1 << 20  # size of arrays that are combined before writing
 
 
@@ -319,17 +319,30 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
     """Write all curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
     channels = result.channels()
     header = [f"{TIME_LABEL} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
-    columns = [result.t, *(np.asarray(v) for _, v in channels.values())]
-    parts = (slice(k, k + ROWS_AT_ONCE) for k in range(0, len(result.t), ROWS_AT_ONCE))
-    write_table(path, header, (row for at in parts for row in zip(*(x[at].tolist() for x in columns), strict=True)))
+    write_table(path, header, [result.t, *(v for _, v in channels.values())])
 
 
-def write_table(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table (.csv)."""
-    with replacing_file(path, TABLE) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
-        writer = csv.writer(text)
-        writer.writerow(header)
-        writer.writerows(rows)
+def write_table(
+    path: str | os.PathLike, header: Sequence[str], columns: Sequence[np.ndarray], missing: str = "nan"
+) -> None:
+    """Write columns of numbers as a table (.csv), each with the fewest digits that are exact.
+
+    ``missing`` is written for nan.
+    """
+    with replacing_file(path, TABLE) as file:
+        line = io.StringIO()
+        csv.writer(line).writerow(header)
+        file.write(line.getvalue().encode())
+        for k in range(0, len(columns[0]), ROWS_AT_ONCE):
+            rows = np.stack([x[k : k + ROWS_AT_ONCE] for x in columns], axis=1)
+            file.write(_csv_rows(rows, missing.encode()))
+
+
+def _csv_rows(numbers: np.ndarray, missing: bytes) -> bytes:
+    from pydantic_core import to_json
+
+    text = to_json(numbers.tolist(), inf_nan_mode="constants")[2:-2].replace(b"],[", b"\r\n") + b"\r\n"
+    return text if np.isfinite(numbers).all() else text.replace(b"NaN", missing).replace(b"Infinity", b"inf")
 
 
 def save(result: Result, path: str | os.PathLike, *, with_labelled: bool = True) -> None:
@@ -495,9 +508,7 @@ def labelled_quantities(result: Result, max_count: float = np.inf, forget: bool 
                 del values
         if forget:
             del view
-            vars(result).pop("_views", None)
-            if (records := vars(result).get("records")) is not None:
-                records.forget()
+            result.forget()
 
 
 def _dimensions(what: str, values: np.ndarray) -> tuple[str, ...]:

@@ -275,9 +275,8 @@ class InverseDynamics:
     def to_csv(self, path: str | os.PathLike) -> None:
         """Times, efforts and reactions as a table; the header holds names and units, undetermined cells are empty."""
         curves = self.channels()
-        rows = np.column_stack([self.t, *(v for _, v in curves.values())])
         header = ["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())]
-        write_table(path, header, (["" if x != x else repr(x) for x in row] for row in rows.tolist()))
+        write_table(path, header, [self.t, *(v for _, v in curves.values())], missing="")
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Efforts and reactions over time; returns the Matplotlib figure, or writes it to ``path``."""

@@ -124,7 +124,9 @@ class RecordedMotion:
 
     def bodies(self, b: Sequence[int] | np.ndarray) -> KinematicRecord:
         """Records of several bodies' centres of mass: arrays (bodies, n)."""
-        return load_record(self.W.bodies[b].swapaxes(0, 1)[None], 0)
+        every = self.W.bodies
+        some = every if np.array_equal(b, np.arange(len(every))) else every[b]  # all of them without a copy
+        return load_record(some.swapaxes(0, 1)[None], 0)
 
     def frame(self, k: int) -> KinematicRecord:
         """Record of frame k."""

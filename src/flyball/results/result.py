@@ -326,7 +326,18 @@ class Result:
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""
-        return {f"{name}.{k}": c for name in self.parts() for k, c in self._view(name).channels().items()}
+        out: dict[str, tuple[str, np.ndarray]] = {}
+        for name in self.parts():
+            out |= {f"{name}.{k}": c for k, c in self._view(name).channels().items()}
+            self.forget()
+        return out
+
+    def forget(self) -> None:
+        """Discard arrays cached for single parts, which need much memory for all parts together."""
+        vars(self).pop("_views", None)
+        for name in ("records", "motions"):
+            if name in vars(self):
+                getattr(self, name).forget()
 
     def state_at_end(self, compiled: Any) -> np.ndarray:
         """Return the final state vector, for continuation.

@@ -116,7 +116,7 @@ def refined_nodes(
 
 def cumulative_integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Return the integrals (n, k) of powers (n, k) over time, zero at the first time."""
-    pieces, _ = _interval_integrals(t, P)
+    pieces = _quadrature(t, P, min(NODES, len(t))) if len(t) > 1 else np.zeros((0, P.shape[1]))
     return np.vstack([np.zeros(P.shape[1]), np.cumsum(pieces, axis=0)])
 
 
@@ -153,6 +153,18 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     middle, half = 0.5 * (t[1:] + t[:-1]), 0.5 * (t[window[:, -1]] - t[window[:, 0]])
     x = (t[window] - middle[:, None]) / half[:, None]
     ends = np.stack([t[:-1] - middle, t[1:] - middle], axis=1) / half[:, None]
+    rounding = 4.0 * np.finfo(float).eps * np.abs(t[[0, -1]]).max() / half
+    other = np.abs(x - x[n // 2]).max(axis=1) > rounding  # most windows of evenly spaced times are like the middle one
+    other[n // 2] = True
+    weights = np.empty((n, m))
+    weights[other] = _quadrature_weights(x[other], ends[other])
+    weights[~other] = weights[n // 2]
+    return np.einsum("im,imk->ik", weights * half[:, None], P[window])
+
+
+def _quadrature_weights(x: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return the weights (n, m) of the nodes (n, m) in the integrals between ends (n, 2)."""
+    n, m = x.shape
     powers = np.arange(m)
     moments = (ends[:, 1:] ** (powers + 1) - ends[:, :1] ** (powers + 1)) / (powers + 1)
     V = np.ones((n, m, m))
@@ -161,8 +173,7 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     crowded = np.diff(x, axis=1).min(axis=1) < CLUSTERED
     weights[~crowded] = np.linalg.solve(V[~crowded], moments[~crowded, :, None])[..., 0]
     weights[crowded] = np.einsum("imk,ik->im", np.linalg.pinv(V[crowded], rcond=RANK_TOLERANCE), moments[crowded])
-    weights *= half[:, None]
-    return np.einsum("im,imk->ik", weights, P[window])
+    return weights
 
 
 def _midpoint_rows(a: Assembly, clock: ex.StepState, known: np.ndarray, intervals: np.ndarray) -> np.ndarray:

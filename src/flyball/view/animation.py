@@ -18,10 +18,12 @@ from ..model.model import suggest
 from .body_shapes import BodyShapes
 from .comparison_tables import difference_tables, measurement_table
 from .event_marks import event_marks
+from .figures import initial_channels
 from .motion_with_events import add_event_states
 from .page import animation_page
 from .playback import Playback, playback_of
 from .recording import (
+    MIN_GROUPED,
     SHOW_OPTIONS,
     Channel,
     Compared,
@@ -34,8 +36,9 @@ from .recording import (
     RecordedLine,
     RecordedPath,
     Recording,
+    group_bodies,
 )
-from .scene import contact_arrows, force_arrows, ground_bodies, recorded_sets, rope_ends
+from .scene import body_poses, contact_arrows, force_arrows, ground_bodies, recorded_sets, rope_ends
 from .symbols import AttachedFrames, GearWheel, SymbolPart, coordinate_spring_line, element_symbols, float_triple
 
 if TYPE_CHECKING:
@@ -78,7 +81,7 @@ def attachment_text(e: Any) -> str:
 
 
 MAX_TIMES = 2000  # approximate number of times in a recording
-MAX_SET_POSES = 1_500_000  # largest number of poses of set members in a recording
+MAX_POSES = 1_500_000  # largest number of poses of many bodies in a recording
 MAX_CURVES = 60
 DEFAULT_SHOW = ("loads", "moments", "grid")
 
@@ -120,7 +123,7 @@ def animation_html(
         measured curves are not as `Result.compare` needs them.
     """
     return animation_page(
-        record_comparison(result, paths=paths, show=show, others=others, label=label, measured=measured)
+        group_bodies(record_comparison(result, paths=paths, show=show, others=others, label=label, measured=measured))
     )
 
 
@@ -209,21 +212,21 @@ def record_motion(
         raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to plot")
     motion = result
     result, every, near, instead = motion_to_show(motion)
-    members = sum(map(len, result.bulk.values()))
+    members = _member_count(result)
     places = AttachedFrames(result)
     looks = BodyShapes(result, places)
     drawn = list(_symbols_and_lines(result, places, looks, every))
     channels = _recorded_channels(result, every) if curves else ()
     bodies = tuple(
-        RecordedBody(b.name, looks.shapes(b.name), *_body_poses(result, b.name, every), b.color)
-        for b in result.model.bodies
+        RecordedBody(b.name, looks.shapes(b.name), p, q, b.color)
+        for b, (p, q) in zip(result.model.bodies, body_poses(result, every), strict=True)
     )
     joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
     sets = recorded_sets(result, every)
     contacts, left_out = contact_arrows(motion, near) if curves else (None, "")
     notes = dict(motion.health.lines()) if with_notes else {}
     if len(every) < len(result.t) and members:
-        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
+        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies"
     if left_out:
         notes["contact arrows"] = left_out
     playback = playback_of(result, every) if with_notes else Playback()
@@ -235,7 +238,7 @@ def record_motion(
         lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
         joints=joints,
         channels=channels,
-        plotted=initial_channels(result, [c.name for c in channels]),
+        plotted=initial_channels(result, channels),
         size=looks.size,
         notes=notes,
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
@@ -268,18 +271,24 @@ class DisplayedMotion(NamedTuple):
 
 def motion_to_show(result: Result) -> DisplayedMotion:
     """Return the displayed motion, with all states around events."""
-    chosen = thinned_times(len(result.t), sum(map(len, result.bulk.values())))
+    chosen = thinned_times(len(result.t), _member_count(result))
     whole, near, more = add_event_states(result)
     every = np.flatnonzero(more | np.isin(near, chosen))
     return DisplayedMotion(whole, every, near[every], np.flatnonzero(~more)[near[every]])
 
 
+def _member_count(result: Result) -> int:
+    """Return the number of bodies in sets, and of single bodies if they are many."""
+    single = len(result.model.bodies)
+    return sum(map(len, result.bulk.values())) + (single if single > MIN_GROUPED else 0)
+
+
 def thinned_times(n: int, members: int = 0) -> np.ndarray:
     """Return the indices of the displayed times: all, or about 2000 evenly chosen, including first and last.
 
-    Fewer if sets have so many members that the page would become too large.
+    Fewer if there are so many bodies that the page would become too large.
     """
-    most = max(2, min(MAX_TIMES, MAX_SET_POSES // max(members, 1)))
+    most = max(2, min(MAX_TIMES, MAX_POSES // max(members, 1)))
     return np.arange(n) if n <= most * 1.25 else np.unique(np.linspace(0, n - 1, most).round().astype(int))
 
 
@@ -295,17 +304,6 @@ def _gravity_direction(result: Result) -> tuple[float, float, float]:
     g = np.asarray(result.values.system.gravity).real
     size = float(np.sqrt(g @ g))
     return float_triple(g / size if size > 0.0 else g)
-
-
-def _body_poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and quaternion of a body's reference frame."""
-    view = result[name]
-    p = np.zeros((len(every), 3))
-    p[:, : 2 if result.planar else 3] = view.position[every]
-    if not result.planar:
-        return p, view.quaternion[every]
-    half = 0.5 * view.angle[every]
-    return p, np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
 
 
 def _symbols_and_lines(
@@ -403,11 +401,9 @@ def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]
         for e in _parts_with_curves(result):
             if len(curves) >= MAX_CURVES:
                 break
-            curves |= {
-                f"{e.name}.{k}": c
-                for k, c in result[e.name].channels().items()
-                if _is_main_curve(f"{e.name}.{k}", result)
-            }
+            view = result[e.name]
+            main = [k for k, x in view.names.items() if x.curve and _is_main_curve(f"{e.name}.{k}", result)]
+            curves |= {f"{e.name}.{k}": view.quantity(k) for k in main}
         names = list(curves)[:MAX_CURVES]
     return tuple(Channel(k, curves[k][0], np.asarray(curves[k][1], float)[every]) for k in names)
 
@@ -432,28 +428,6 @@ def _main_curves(names: list[str], result: Result) -> list[str]:
     rank = {k: (not _is_main_curve(k, result), i) for i, k in enumerate(names)}
     chosen = set(sorted(names, key=rank.__getitem__)[:MAX_CURVES])
     return [k for k in names if k in chosen]
-
-
-def initial_channels(result: Result, names: Collection[str]) -> tuple[str, ...]:
-    """Return the curves shown when a page opens.
-
-    They are sensors; reference, response and output of controllers; efforts of drivers; a joint coordinate of each kind
-    (else a position); energies.
-    """
-    m = result.model
-    measured = [f"{s.name}.value" for s in m.sensors][:2]
-    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown together
-    kinds: dict[str, str] = {}
-    for j in m.joints:
-        for k, c in j.coordinates.items():
-            if f"{j.name}.{k}" in set(names) - compared:
-                kinds.setdefault(c.unit, f"{j.name}.{k}")
-    told = [f"{c.name}.{k}" for c in m.controllers[:1] for k in c.compared]
-    told += [f"{c.name}.{c.output_names[0]}" for c in m.controllers][:2]
-    efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
-    first = [*measured, *told, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
-    energies = ("energy.kinetic", "energy.potential", "energy.total")
-    return (*(k for k in first if k in names), *(k for k in energies if k in names))
 
 
 def equilibrium_page(found: Equilibrium) -> str:

@@ -6,15 +6,16 @@ planes of the cell's triangles (P. Lindstrom, "Out-of-core simplification of lar
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..model.element import resolve
-from ..model.geometry import matrix_to_quaternion, triad
+from ..model.geometry import matrix_to_quaternion, quaternion_to_matrix, triad
 from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
-from .recording import RecordedJoint, Shape
+from .recording import RecordedJoint, Shape, shape_box
 from .symbols import BODY_SYMBOLS, AttachedFrame, AttachedFrames, cam_outline, float_triple
 
 if TYPE_CHECKING:
@@ -106,6 +107,9 @@ def _cell_vertices(vertices: np.ndarray, triangles: np.ndarray, cells: np.ndarra
     return middle + shift
 
 
+HELD_AT_POINT = ("revolute", "spherical", "universal", "fixed", "point_on_line", "point_in_plane", "link", "bushing")
+"""Joints that hold both bodies at a point; elsewhere the place of a frame along a guide is arbitrary."""
+MIN_GAP = 0.09  # distance of a joint from a shape that a link spans, relative to the mechanism's typical length
 LINK_RADIUS = 0.045  # radius of a link, relative to the mechanism's typical length
 MAX_TRIANGLES = 24_000  # number of triangles of all meshes of a recording
 MIN_MESH_TRIANGLES = 300  # number of triangles that a mesh keeps in any case
@@ -131,7 +135,9 @@ class BodyShapes:
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
         self.blocks: dict[str, list[AttachedFrame]] = {b.name: [] for b in result.model.bodies}
         self.cams: dict[str, list[Any]] = {b.name: [] for b in result.model.bodies}
+        self.held: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
         self.shown_by_symbol: set[str] = set()  # bodies represented by a symbol such as a gear wheel
+        self.racks: dict[str, Shape] = {}  # boxes around racks
         for e in (*result.model.joints, *result.model.forces):
             self._attach(e)
         reach = {name: self._reach(name) for name in self.points}
@@ -151,6 +157,9 @@ class BodyShapes:
             self._slide(ends)
             return
         guide, runner = ends
+        for end in ends if e.symbol in HELD_AT_POINT else ():
+            if end.body in self.held and not (e.symbol == "point_on_line" and end is guide):
+                self.held[end.body].append(end.p)
         if e.symbol == "cam" and not guide.grounded:
             self.cams[guide.body].append(e)
         if e.symbol in ("point_on_line", "screw") and not guide.grounded:
@@ -203,6 +212,8 @@ class BodyShapes:
             if self.given(symbol.body):
                 return None
             self.shown_by_symbol.add(symbol.body)
+            if symbol.kind == "rack":
+                self.racks[symbol.body] = _rack_box(symbol)
             return symbol
         widths = [self._width(name) for name in (symbol.body, symbol.mate) if name and self.given(name)]
         if not widths:
@@ -229,9 +240,11 @@ class BodyShapes:
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """Return the body's shapes."""
         if self.given(name):
-            return tuple(self._given(s) for s in self._solids[name])
+            given = [self._given(s) for s in self._solids[name]]
+            return (*given, *self._joining(given, self.held[name]))
         points = self.points[name]
         out = [self._block(end) for end in self.blocks[name] if name not in self.shown_by_symbol]
+        out += self._rack_guides(name) if name in self.racks else []
         out += [shape for e in self.cams[name] for shape in self._cam(e)]
         bare = not out and name not in self.shown_by_symbol
         if len(points) >= 2:
@@ -241,6 +254,21 @@ class BodyShapes:
         elif bare:
             out += [self._solid(name)]
         return tuple(out)
+
+    def _joining(self, shapes: list[Shape], points: list[np.ndarray]) -> Iterator[Shape]:
+        """Return links from joints to the nearest shape, where that stands away from them."""
+        for k, p in enumerate(points):
+            targets = [_nearest_point(s, p) for s in shapes if not s.hole]
+            gap, to = min(targets, key=lambda x: x[0], default=(0.0, p))
+            if gap > MIN_GAP * self.size and all(np.abs(p - other).max() > 0.0 for other in points[:k]):
+                yield replace(self._capsule(p, to, 0.6), link=True)
+
+    def _rack_guides(self, name: str) -> Iterator[Shape]:
+        """Return the blocks of a rack's guides that are not within the rack, joined to it."""
+        for end in self.blocks[name]:
+            if _nearest_point(self.racks[name], end.p)[0] > MIN_GAP * self.size:
+                yield self._block(end)
+                yield from self._joining([self.racks[name]], [end.p])
 
     def _mesh_share(self) -> float:
         """Return the fraction of their triangles that meshes may keep, so that the page stays small."""
@@ -367,6 +395,28 @@ def shape_from_solid(s: Any, n: Any, share: float = 1.0) -> Shape:
     kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
     turn = tuple(matrix_to_quaternion(R).tolist())
     return Shape(kind, tuple(map(float, s.size(n))), float_triple(p), turn, hole=s.hole)
+
+
+RACK_DEPTH = 4.2 / np.pi  # depth of a rack below its pitch line, in pitches
+
+
+def _rack_box(symbol: RecordedJoint) -> Shape:
+    """Return the box around a rack's symbol."""
+    assert symbol.reach is not None
+    _, pitch = symbol.size
+    low, high = np.array([symbol.reach[0] - pitch, -RACK_DEPTH * pitch]), np.array([symbol.reach[1] + pitch, 0.0])
+    at = np.array(symbol.position) + quaternion_to_matrix(np.array(symbol.quaternion)) @ np.r_[0.5 * (low + high), 0.0]
+    return Shape("box", (*(high - low).tolist(), RACK_DEPTH * pitch), float_triple(at), symbol.quaternion)
+
+
+def _nearest_point(shape: Shape, p: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the distance of a point from the box around a shape, and a point in the shape near to it."""
+    R, (low, high) = quaternion_to_matrix(np.array(shape.quaternion)), shape_box(shape)
+    own = R.T @ (p - np.array(shape.position))
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    gap = own - np.clip(own, low, high)
+    inside = np.clip(own, middle - 0.7 * half, middle + 0.7 * half)  # what is round does not fill its box
+    return float(np.sqrt(gap @ gap)), np.array(shape.position) + R @ inside
 
 
 def _shape_extents(kind: str, size: tuple[float, ...]) -> list[float]:

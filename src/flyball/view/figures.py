@@ -198,6 +198,54 @@ def hidden_counts(curves: Sequence[np.ndarray]) -> list[int]:
     return out
 
 
+MAX_INITIAL = 2  # coordinates of one unit that a page shows when it opens
+STEADY_PART = 1e-3  # a coordinate that varies less, relative to the largest variation of its unit, does not move
+TRAVEL_PART = 0.9  # a coordinate whose end is this far from its start, relative to its variation, travels
+
+
+def initial_channels(result: Result, channels: Sequence[Channel]) -> tuple[str, ...]:
+    """Return the curves shown when a page opens, of those that it has.
+
+    They are sensors; reference, response and output of controllers; efforts of drivers; of each unit two coordinates of
+    joints (without joints: of bodies) that move; energies. Of coordinates that swing those of initial conditions come
+    first. One that travels is shown where none of its unit swings, a driven one that travels where nothing else moves.
+    """
+    m, curves = result.model, {c.name: c for c in channels}
+    measured = [f"{s.name}.value" for s in m.sensors][:2]
+    compared = [f"{c.name}.{k}" for c in m.controllers[:1] for k in c.compared]
+    sources = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}
+    outputs = [f"{c.name}.{c.output_names[0]}" for c in m.controllers][:2]
+    efforts = [k for d in m.drivers if (k := f"{d.name}.effort") in curves][:1]
+    joints = [f"{j.name}.{k}" for j in m.joints for k in j.coordinates]
+    own = [f"{b.name}.{k}" for b in m.bodies for k in ("x", "y", "z", "angle", "roll", "pitch", "yaw")]
+    usable = [[curves[k] for k in names if k in curves and k not in sources] for names in (joints, own)]
+    asked = {e.name for e in m.elements() if e.category == "initial"}
+    driven = {d.coordinate for d in m.drivers}
+    moving = _moving_coordinates(usable[0] or usable[1], asked, driven)
+    energies = ("energy.kinetic", "energy.potential", "energy.total")
+    return tuple(k for k in (*measured, *compared, *outputs, *efforts, *moving, *energies) if k in curves)
+
+
+def _moving_coordinates(curves: Sequence[Channel], asked: set[str], driven: set[str]) -> list[str]:
+    """Return the coordinates of each unit that say most about the motion: the best of one rank."""
+    out: list[tuple[int, list[str]]] = []
+    for unit in dict.fromkeys(c.unit for c in curves):
+        own = [c for c in curves if c.unit == unit and np.isfinite(c.values).any()]
+        spans = {c.name: float(np.nanmax(c.values) - np.nanmin(c.values)) for c in own}
+        largest = max(spans.values(), default=0.0)
+        ranks: dict[int, list[str]] = {}
+        for c in own:
+            span = spans[c.name]
+            if span > STEADY_PART * largest:
+                travels = abs(c.values[-1] - c.values[0]) > TRAVEL_PART * span
+                ranks.setdefault(2 + (c.name in driven) if travels else c.name not in asked, []).append(c.name)
+        if ranks:
+            best = sorted(ranks[min(ranks)], key=lambda k: -round(2.0 * np.log10(spans[k])))
+            out.append((min(ranks), best[:MAX_INITIAL]))
+    first = min((rank for rank, _ in out), default=0)
+    return [k for rank, names in out if rank == first or rank < 3 for k in names]
+
+
 def moving_bodies(result: Result) -> list[str]:
     """Names of all bodies; if there are sets only, those of their members."""
     names = [b.name for b in result.model.bodies]

@@ -233,7 +233,7 @@ def _shape_data(shape: Shape, block: _NumberBlock) -> dict[str, object]:
         "position": _float_list(shape.position),
     }
     out |= {"quaternion": _float_list(shape.quaternion), "outline": [_float_list(point) for point in shape.outline]}
-    out["hole"] = bool(shape.hole)
+    out |= {"hole": bool(shape.hole), "link": bool(shape.link)}
     if shape.vertices is not None and shape.triangles is not None:
         kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
         return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}
@@ -247,6 +247,7 @@ def _set_data(many: RecordedSet, block: _NumberBlock) -> dict[str, object]:
     p, about = pack_positions(np.asarray(many.p, float), size)
     kind = str(about.pop("type"))
     out: dict[str, object] = {"name": many.name, "colors": list(many.colors), "count": int(np.shape(many.p)[1])}
+    out["names"] = list(many.names)
     out |= {"shapes": [_shape_data(s, block) for s in many.shapes], "p": block.add(p, kind)} | about
     out["q"] = block.add(pack_orientations(np.asarray(many.q, float)), "u2")
     return out | {"scale": None if many.scale is None else block.add(many.scale)}

@@ -8,6 +8,7 @@ Objects fixed on a body (or on ``"ground"``) are given in the axes of that body,
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Shape:
     ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness), ``mesh`` (no size;
     ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside).
 
-    A ``hole`` is drawn as a dark opening in the body's other shapes.
+    A ``hole`` is drawn as a dark opening in the body's other shapes; a ``link`` joins them to a joint.
     """
 
     kind: str
@@ -38,6 +39,7 @@ class Shape:
     vertices: np.ndarray | None = None
     triangles: np.ndarray | None = None
     hole: bool = False
+    link: bool = False
 
 
 def scaled_shape(shape: Shape, factor: float) -> Shape:
@@ -52,17 +54,28 @@ def scaled_shape(shape: Shape, factor: float) -> Shape:
     )
 
 
+def shape_box(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Return the low and high corners of the box around a shape, in the shape's own axes [m]."""
+    if shape.kind == "mesh":
+        points = np.asarray(shape.vertices, float)
+        return points.min(axis=0), points.max(axis=0)
+    if shape.kind == "plate":
+        points, half = np.array(shape.outline), 0.5 * shape.size[0]
+        return np.r_[points.min(axis=0), -half], np.r_[points.max(axis=0), half]
+    if shape.kind == "box":
+        high = 0.5 * np.array(shape.size)
+    elif shape.kind in ("sphere", "ellipsoid"):
+        high = np.broadcast_to(shape.size, 3).astype(float)
+    else:
+        radius, length = shape.size
+        high = np.array([radius, radius, 0.5 * length + (radius if shape.kind == "capsule" else 0.0)])
+    return -high, high
+
+
 def half_extent(shape: Shape) -> float:
     """Return about half the largest length of a shape [m]."""
-    if shape.kind == "mesh":
-        return 0.5 * float(np.ptp(np.asarray(shape.vertices), axis=0).max(initial=0.0))
-    if shape.kind == "plate":
-        return 0.5 * float(np.ptp(np.array(shape.outline), axis=0).max())
-    round_ones = {"sphere": 1.0, "ellipsoid": 1.0, "box": 0.5}
-    if shape.kind in round_ones:
-        return round_ones[shape.kind] * max(shape.size)
-    radius, length = shape.size
-    return max(radius, 0.5 * length + (radius if shape.kind == "capsule" else 0.0))
+    low, high = shape_box(shape)
+    return 0.5 * float((high - low).max())
 
 
 @dataclass(frozen=True)
@@ -79,7 +92,7 @@ class RecordedBody:
 
 @dataclass(frozen=True)
 class RecordedSet:
-    """A set of bodies of one shape, named ``name[0]``, ``name[1]``, ...; drawn together.
+    """A set of bodies of one shape, named ``name[0]``, ``name[1]``, ... or by ``names``; drawn together.
 
     ``p`` (n, m, 3) [m] and ``q`` (n, m, 4) scalar first, world from body, of m bodies; ``scale`` (m,) if their sizes
     differ; ``colors`` are used in turn, if there are several. A body whose pose is nan is not drawn.
@@ -91,6 +104,7 @@ class RecordedSet:
     q: np.ndarray
     colors: tuple[str, ...] = ()
     scale: np.ndarray | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -364,7 +378,41 @@ SHOW_OPTIONS = {
 
 SHAPE_SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "cone": 2, "ellipsoid": 3, "plate": 1, "mesh": 0}
 LINE_KINDS = ("spring", "damper", "link", "rope", "arrow")
+RIDERS = ("joints", "curves", "arrows", "frames", "paths")
+"""Fields of a recording whose objects are fixed on bodies."""
 ARROW_GROUPS = ("reaction", "element", "load")
+
+
+MIN_GROUPED = 200
+"""Number of single bodies of the same shapes from which they are drawn together, as a set."""
+
+
+def group_bodies(recording: Recording) -> Recording:
+    """Return a recording in which many bodies of the same shapes, on which nothing is fixed, are sets."""
+    fixed = {rider.body for what in RIDERS for rider in getattr(recording, what)} | {j.mate for j in recording.joints}
+    groups: dict[Any, list[RecordedBody]] = {}
+    for b in recording.bodies:
+        if b.shapes and b.name not in fixed:
+            groups.setdefault((b.opacity, tuple(map(_shape_key, b.shapes))), []).append(b)
+    many = [g for g in groups.values() if len(g) >= MIN_GROUPED and g[0].opacity == 1.0]
+    if not many:
+        return recording
+    grouped = {b.name for g in many for b in g}
+    single = tuple(b for b in recording.bodies if b.name not in grouped)
+    return replace(recording, bodies=single, sets=(*recording.sets, *map(_body_set, many)))
+
+
+def _shape_key(shape: Shape) -> Any:
+    mesh = None if shape.vertices is None else (shape.vertices.tobytes(), np.asarray(shape.triangles).tobytes())
+    return shape.kind, shape.size, shape.position, shape.quaternion, shape.outline, shape.hole, mesh
+
+
+def _body_set(bodies: list[RecordedBody]) -> RecordedSet:
+    p, q = (np.stack([getattr(b, k) for b in bodies], axis=1) for k in ("p", "q"))
+    colored = any(b.color for b in bodies)
+    colors = tuple(b.color or BODY_COLORS[k % len(BODY_COLORS)] for k, b in enumerate(bodies)) if colored else ()
+    names = tuple(b.name for b in bodies)
+    return RecordedSet(f"{names[0]} ... {names[-1]}", bodies[0].shapes, p, q, colors, names=names)
 
 
 def check_recording(recording: Recording) -> None:
@@ -442,6 +490,8 @@ def _check_set(many: RecordedSet, n: int) -> None:
         _check_shape(f"set {many.name!r}: {what}", getattr(many, what), (n, m, width))
     if many.scale is not None and (np.shape(many.scale) != (m,) or not (np.asarray(many.scale) > 0).all()):
         raise ValueError(f"set {many.name!r}: scale must be {m} positive numbers")
+    if many.names and len(many.names) != m:
+        raise ValueError(f"set {many.name!r}: it has {m} members, and {len(many.names)} names")
     if not many.shapes:
         raise ValueError(f"set {many.name!r}: it has no shape to draw")
     for shape in many.shapes:
@@ -478,7 +528,7 @@ def _check_riders(recording: Recording) -> None:
     if twice:
         raise ValueError(f"recording {recording.name!r}: two bodies are named {sorted(twice)[0]!r}")
     known = {*(body.name for body in recording.bodies), "ground"}
-    for what in ("joints", "curves", "arrows", "frames", "paths"):
+    for what in RIDERS:
         for rider in getattr(recording, what):
             if rider.body not in known:
                 rider_is = f"{what.removesuffix('s')} {rider.name!r}"

@@ -20,6 +20,7 @@ from .symbols import AttachedFrame, AttachedFrames, coordinate_axis, coordinate_
 
 if TYPE_CHECKING:
     from ..results.contacts import Contacts
+    from ..results.motion_record import RecordedMotion
     from ..results.result import Result
 
 
@@ -40,6 +41,30 @@ def recorded_sets(result: Result, every: np.ndarray) -> tuple[RecordedSet, ...]:
         colors = (e.color,) if e.color else ()
         out.append(RecordedSet(name, shapes, bulk.origin[every], bulk.quaternion[every], colors, scale))
     return tuple(out)
+
+
+POSES_AT_ONCE = 1 << 18
+
+
+def body_poses(result: Result, every: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Return positions (n, 3) and quaternions (n, 4) of the reference frame of each body at the recorded times."""
+    parts = [piece.motions for piece in result.pieces or (result,)]
+    names = [b.name for b in result.model.bodies]
+    block = max(1, POSES_AT_ONCE // max(len(every), 1))
+    for first in range(0, len(names), block):
+        found = [_poses_of(motions, names[first : first + block]) for motions in parts]
+        p, R = (np.concatenate(x, axis=1)[:, every] for x in zip(*found, strict=True))
+        yield from zip(p, matrix_to_quaternion(R), strict=True)
+
+
+def _poses_of(motions: RecordedMotion, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions (m, n, 3) and rotation matrices (m, n, 3, 3) of the reference frames of bodies."""
+    placed = [motions.placed(name) for name in names]
+    at, offset, turn = ([x[k] for x in placed] for k in range(3))
+    centre, axes = (np.moveaxis(x[at].real, 1, 2) for x in (motions.W.bodies.position, motions.W.bodies.rotation))
+    R = axes.reshape(*axes.shape[:2], 3, 3)
+    p = centre + np.einsum("mnij,mj->mni", R, np.real(offset))
+    return p, R @ np.real(turn).reshape(-1, 1, 3, 3)
 
 
 def _parameter_values(result: Result) -> dict[str, float]:

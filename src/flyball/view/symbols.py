@@ -353,6 +353,7 @@ POINTS_PER_VERTEX, MIN_PROFILE_POINTS, MAX_PROFILE_POINTS = (
 )  # points of a drawn profile: for each given point, and in total
 SymbolPart = RecordedJoint | RecordedCurve | RecordedLine
 
+PINNED = ("revolute", "spherical", "universal", "fixed")  # symbols of one size, whose parts do not move apart
 BODY_SYMBOLS = ("gear", "rack", "wheel", "ball")  # symbols of the body itself, if it has no shape of its own
 
 
@@ -453,7 +454,7 @@ def _joint_symbol(
     e: Any, kind: str, end: AttachedFrame, other: AttachedFrame, places: AttachedFrames, size: tuple[float, ...] = ()
 ) -> RecordedJoint:
     turn = tuple(matrix_to_quaternion(end.R).tolist())
-    reach = places.reach(end, other)
+    reach = None if kind in PINNED else places.reach(end, other)
     return RecordedJoint(
         e.name, kind, end.body, float_triple(end.p), float_triple(end.R[:, 2]), turn, other.body, reach, size
     )

@@ -116,13 +116,18 @@ export class Crowd {
       const group = new THREE.Group();
       this.#pose(k, group);
       const glow = (on) => this.#glow(k, on);
-      this.members.set(k, { name: `${this.name}[${k}]`, category: "body", group, glow, colour: this.colour });
+      const name = this.data.names[k] ?? `${this.name}[${k}]`;
+      this.members.set(k, { name, category: "body", group, glow, colour: this.colour });
     }
     return this.members.get(k);
   }
 
   /** The member of a name such as "balls[17]", or null. */
   named(name) {
+    if (this.data.names.length) {
+      this.numbers ??= new Map(this.data.names.map((own, k) => [own, k]));
+      return this.numbers.has(name) ? this.member(this.numbers.get(name)) : null;
+    }
     if (!name.startsWith(`${this.name}[`) || !name.endsWith("]")) return null;
     const k = Number(name.slice(this.name.length + 1, -1));
     return Number.isInteger(k) && k >= 0 && k < this.count ? this.member(k) : null;

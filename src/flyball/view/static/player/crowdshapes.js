@@ -25,14 +25,14 @@ function coarse(shape, sides) {
   if (kind === "cylinder") return new THREE.CylinderGeometry(a, a, b, sides).rotateX(Math.PI / 2);
   if (kind === "capsule") return new THREE.CapsuleGeometry(a, b, Math.ceil(sides / 4), sides).rotateX(Math.PI / 2);
   if (kind === "cone") return new THREE.ConeGeometry(a, b, sides).rotateX(Math.PI / 2);
-  return solidGeometry(shape);
+  return solidGeometry(shape).clone();
 }
 
 /** The geometry of a shape in the axes of its body. */
 function geometryOf(shape, count) {
   const sides = FINENESS.find(([most]) => count <= most)[1];
   const fine =
-    count <= FEW && shape.kind !== "sphere" ? solidGeometry(shape) : coarse(shape, count <= FEW ? 44 : sides);
+    count <= FEW && shape.kind !== "sphere" ? solidGeometry(shape).clone() : coarse(shape, count <= FEW ? 44 : sides);
   const frame = placed(new THREE.Group(), shape);
   frame.updateMatrix();
   return fine.applyMatrix4(frame.matrix);

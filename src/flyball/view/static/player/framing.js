@@ -18,6 +18,12 @@ function bodyPoints(body, planar) {
 
 /** Symbols reach a little around their joint, wheels by their radius. */
 function jointPoints(joint, unit, planar) {
+  if (joint.kind === "rack") {
+    const [w, x, y, z] = joint.quaternion;
+    const turn = new THREE.Quaternion(x, y, z, w);
+    const ends = [joint.reach[0] - joint.size[1], joint.reach[1] + joint.size[1]];
+    return ends.map((end) => new THREE.Vector3(end, 0, 0).applyQuaternion(turn).add({ x: joint.position[0], y: joint.position[1], z: joint.position[2] }));
+  }
   const bodily = ["wheel", "ball", "gear"].includes(joint.kind) ? joint.size[0] : 0;
   const reach = Math.max(0.1 * unit * joint.scale, bodily);
   const signs = [-1, 1];
@@ -80,7 +86,7 @@ export function motionPoints(recording, unit) {
     const n = columns.length / 3;
     for (const i of sampleNumbers(n, 24)) target.push(pointAt(columns, { i, j: i, f: 0 }, new THREE.Vector3()));
   }
-  points.push(...crowdPoints(recording));
+  for (const point of crowdPoints(recording)) points.push(point);
   const ends = lines.flatMap((line) => line.points);
   const each = [...own.values()].reduce((sum, list) => sum + list.length, 1) + ends.length;
   const pose = new THREE.Group();

@@ -66,7 +66,7 @@ function sweptRoom(joint, recording, u) {
   if (!travel) return { x: [-0.2 * u, 0.2 * u], y: [-0.06 * u, 0.06 * u] };
   const [along, across] = [at(joint.axis[0], joint.axis[1]).normalize(), at(-joint.axis[1], joint.axis[0]).normalize()];
   const origin = new THREE.Vector3(...joint.position);
-  const points = travel.body.shapes.flatMap(silhouette).map(({ x, y }) => {
+  const points = travel.body.shapes.filter(({ link }) => !link).flatMap(silhouette).map(({ x, y }) => {
     const point = new THREE.Vector3(x, y, 0).applyQuaternion(travel.pose.q).add(travel.pose.p).sub(origin);
     return at(along.dot(point) - travel.first, across.dot(point));
   });

@@ -1,7 +1,7 @@
 // Symbols of joints in space: dark metal parts that ride on their body; a stand under those fixed to ground.
 import * as THREE from "three";
 import { gearShape, rackShape } from "./gearshape.js";
-import { cylinderGeometry, extruded } from "./solids.js";
+import { cylinderGeometry, extruded, FINENESS } from "./solids.js";
 import { hangs } from "./travel.js";
 
 const TURN = 2 * Math.PI;
@@ -56,6 +56,19 @@ function blade(u) {
   return [extruded(new THREE.Shape(outline), 0.01 * u).rotateY(-Math.PI / 2)];
 }
 
+const REACHING = ["cylindrical", "prismatic", "screw", "rail", "roller"]; // as long as their mate moves, or of a size
+const kept = new Map(); // kind and size of a symbol -> its geometries, which equal symbols share
+
+function partsOf(u, joint) {
+  const { kind } = joint;
+  const make = PARTS[kind] ?? PARTS.mark;
+  if (REACHING.includes(kind)) return make(u, joint);
+  const key = `${kind} ${u} ${FINENESS.fine}`;
+  if (kept.size > 100) kept.clear();
+  if (!kept.has(key)) kept.set(key, make(u));
+  return kept.get(key);
+}
+
 const PARTS = {
   revolute: (u) => [cylinderGeometry(0.026 * u, 0.11 * u), flange(u, 0.045), flange(u, -0.045)],
   cylindrical: (u, joint) => [rod(0.017 * u, along(joint, 0.12 * u))],
@@ -65,7 +78,7 @@ const PARTS = {
     return [bar.translate(0, 0, (from + to) / 2)];
   },
   screw: thread,
-  spherical: (u) => [new THREE.SphereGeometry(0.037 * u, 36, 24)],
+  spherical: (u) => [new THREE.SphereGeometry(0.037 * u, FINENESS.sides(36), FINENESS.sides(24))],
   point: (u) => [new THREE.SphereGeometry(0.026 * u, 32, 20)],
   universal: (u) => [
     cylinderGeometry(0.014 * u, 0.12 * u),
@@ -136,7 +149,7 @@ export function solidJoint(joint, recording, unit, index, colour) {
     });
     put(geometry, paint);
     for (const mark of [marks ?? []].flat()) put(mark, shade);
-  } else for (const part of (PARTS[joint.kind] ?? PARTS.mark)(u, joint)) put(part, dark);
+  } else for (const part of partsOf(u, joint)) put(part, dark);
   group.add(symbol);
   if (joint.body === "ground" && STANDS.includes(joint.kind)) {
     const grey = new THREE.MeshStandardMaterial({ color: "#8d97a3", roughness: 0.7, flatShading: true });

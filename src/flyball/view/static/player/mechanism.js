@@ -7,7 +7,7 @@ import { ORDER, flatBody, stroke } from "./flats.js";
 import { flatJoint } from "./joints2d.js";
 import { solidJoint } from "./joints3d.js";
 import { buildLine } from "./lines.js";
-import { solidBody } from "./solids.js";
+import { refine, solidBody } from "./solids.js";
 import { bodyColours, GROUND } from "./theme.js";
 import { Trail } from "./trails.js";
 import { Triads } from "./triads.js";
@@ -21,6 +21,7 @@ export class Mechanism {
     this.root = new THREE.Group();
     this.overlay = new THREE.Group(); // drawn on top of everything else
     const colours = bodyColours(recording.bodies);
+    refine(recording.bodies.length);
     this.bodies = recording.bodies.map((body, k) => this.#body(body, colours[k], k));
     const palette = bodyColours([...recording.bodies, ...recording.sets.map(({ name }) => ({ name }))]);
     this.crowds = recording.sets.map((data, k) => this.#crowd(data, palette[recording.bodies.length + k], k));

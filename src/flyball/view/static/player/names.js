@@ -20,18 +20,18 @@ export class Names {
       ...mechanism.bodies.map((body) => ({
         name: body.name,
         body: body.name,
-        position: middle(body.data),
+        data: body.data,
         kind: "body",
       })),
       ...mechanism.joints.map(({ data }) => ({ ...data, kind: "joint" })),
-    ].filter(({ name }) => !once.has(name) && once.add(name));
+    ].filter(({ name }) => once.size < MOST && !once.has(name) && once.add(name));
     this.mechanism = mechanism;
     this.box = box;
     box.replaceChildren();
-    this.parts = parts.slice(0, MOST).map((part) => {
+    this.parts = parts.map((part) => {
       const label = element("span", { className: part.kind, textContent: part.name });
       box.append(label);
-      return { ...part, label };
+      return { ...part, position: part.position ?? middle(part.data), label };
     });
     box.hidden = true;
   }

@@ -119,6 +119,8 @@ function switchButton(className, title, on, onClick, ...children) {
   return button;
 }
 
+const BODILY = ["gear", "rack", "wheel", "ball"]; // symbols that are the body itself
+
 /** How many bodies there are, in words. */
 export function bodyCount({ bodies, sets }) {
   const count = sets.reduce((sum, set) => sum + set.count, bodies.length);
@@ -129,7 +131,7 @@ export function bodyCount({ bodies, sets }) {
 export function bodyLegend(
   box,
   toggle,
-  { bodies, trails, crowds },
+  { bodies, joints, trails, crowds },
   { onShow, onTrail, onPoint, onSelect, onPath, onSet },
 ) {
   const swatch = (colour, className = "swatch") => {
@@ -137,7 +139,8 @@ export function bodyLegend(
     mark.style.background = colour;
     return mark;
   };
-  const rows = bodies.map(({ name, colour }, index) => {
+  const worn = new Set(joints.filter(({ data }) => BODILY.includes(data.kind)).map(({ data }) => data.body));
+  const rows = bodies.map(({ name, colour, data }, index) => {
     const text = element("span", { className: "name", textContent: name });
     const select = element(
       "button",
@@ -159,6 +162,7 @@ export function bodyLegend(
       eye(),
     );
     item.append(show);
+    item.hidden = !data.shapes.length && !worn.has(name); // a legend of what is seen
     item.addEventListener("pointerenter", () => onPoint(index, true));
     item.addEventListener("pointerleave", () => onPoint(index, false));
     return item;

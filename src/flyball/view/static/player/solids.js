@@ -1,13 +1,20 @@
 // Solids of spatial bodies: one geometry for each kind of shape, edges softened so that they catch the light.
 import * as THREE from "three";
+import { sinks, THEMES } from "./theme.js";
 
-const ROUND = 48;
+const FEW = 300; // bodies up to which shapes and symbols are fine
+/** Sides of what is round: fewer where bodies are many. */
+export const FINENESS = { fine: true, sides: (n) => (FINENESS.fine ? n : Math.ceil(n / 4)) };
+/** Choose the fineness for a number of bodies. */
+export function refine(count) {
+  FINENESS.fine = count <= FEW;
+}
 const PROUD = 1.004; // a hole is a dark plug that stands out by so little that only its openings show
 
 /** A turned part along z from its profile of (radius, z) pairs, going up. */
 function turned(profile) {
   const points = profile.map(([radius, z]) => new THREE.Vector2(Math.max(radius, 0), z));
-  return new THREE.LatheGeometry(points, 72).rotateX(Math.PI / 2);
+  return new THREE.LatheGeometry(points, FINENESS.sides(72)).rotateX(Math.PI / 2);
 }
 
 /** A cylinder along z with chamfered rims; corners are doubled, so that faces stay flat. */
@@ -59,20 +66,30 @@ export function meshGeometry({ vertices, triangles }) {
 
 const CREASE = 0.6; // rad; edges sharper than this are not smoothed over
 
+const unitBall = () => new THREE.SphereGeometry(1, FINENESS.sides(48), FINENESS.sides(32)).rotateX(Math.PI / 2);
+
 const MAKERS = {
-  box: ([x, y, z]) => new THREE.RoundedBoxGeometry(x, y, z, 3, 0.06 * Math.min(x, y, z)),
-  sphere: ([radius]) => new THREE.SphereGeometry(radius, ROUND, 32).rotateX(Math.PI / 2),
+  box: ([x, y, z]) => new THREE.RoundedBoxGeometry(x, y, z, FINENESS.sides(3), 0.06 * Math.min(x, y, z)),
+  sphere: ([radius]) => unitBall().scale(radius, radius, radius),
   cylinder: ([radius, length]) => cylinderGeometry(radius, length),
-  capsule: ([radius, length]) => new THREE.CapsuleGeometry(radius, length, 12, 36).rotateX(Math.PI / 2),
-  cone: ([radius, height]) => new THREE.ConeGeometry(radius, height, ROUND).rotateX(Math.PI / 2),
-  ellipsoid: ([a, b, c]) => new THREE.SphereGeometry(1, ROUND, 32).rotateX(Math.PI / 2).scale(a, b, c),
+  capsule: ([radius, length]) => new THREE.CapsuleGeometry(radius, length, FINENESS.sides(12), FINENESS.sides(36)).rotateX(Math.PI / 2),
+  cone: ([radius, height]) => new THREE.ConeGeometry(radius, height, FINENESS.sides(48)).rotateX(Math.PI / 2),
+  ellipsoid: ([a, b, c]) => unitBall().scale(a, b, c),
   plate: ([thickness], { outline }) => plateGeometry(outline, thickness),
   mesh: (_, shape) => THREE.toCreasedNormals(meshGeometry(shape), CREASE),
 };
 
+const MOST_KEPT = 500;
+const kept = new Map(); // a shape's kind and size -> its geometry, which all bodies share
+
 /** The geometry of a shape, in the shape's own axes. */
 export function solidGeometry(shape) {
-  return MAKERS[shape.kind](shape.size, shape);
+  const { kind, size, outline } = shape;
+  if (kind === "mesh") return MAKERS.mesh(size, shape);
+  const key = JSON.stringify([kind, size, outline, FINENESS.fine]);
+  if (kept.size > MOST_KEPT) kept.clear();
+  if (!kept.has(key)) kept.set(key, MAKERS[kind](size, shape));
+  return kept.get(key);
 }
 
 /** Put an object where its shape says it sits on the body. */
@@ -91,6 +108,20 @@ function spinMarks({ kind, size }, material) {
   return [mark];
 }
 
+const EDGE = 0.012; // width of the edge around a dark shape, as part of its size
+
+/** A lighter shell around a shape, of which only the inside is seen: an edge all around. */
+function shell(geometry, material) {
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
+  const size = geometry.boundingBox.getSize(new THREE.Vector3());
+  const middle = geometry.boundingBox.getCenter(new THREE.Vector3());
+  const width = 2 * EDGE * size.length();
+  const mesh = new THREE.Mesh(geometry, material);
+  mesh.scale.set(...size.toArray().map((x) => 1 + width / Math.max(x, 1e-12)));
+  mesh.position.copy(middle).sub(middle.clone().multiply(mesh.scale));
+  return mesh;
+}
+
 /** A spatial body: a group of lit meshes. */
 export function solidBody(body, colour) {
   const group = new THREE.Group();
@@ -101,22 +132,32 @@ export function solidBody(body, colour) {
   dark.color.multiplyScalar(0.3);
   const opening = new THREE.MeshStandardMaterial({ color: colour, roughness: 1 });
   opening.color.multiplyScalar(0.12);
+  const shells = [];
+  const light = new THREE.MeshBasicMaterial({ side: THREE.BackSide });
   for (const shape of body.shapes) {
     const holder = placed(new THREE.Group(), shape);
     if (shape.hole) {
       holder.add(new THREE.Mesh(solidGeometry(shape), opening));
       holder.children[0].scale.setScalar(PROUD);
-    } else holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
+    } else {
+      const mesh = new THREE.Mesh(solidGeometry(shape), material);
+      holder.add(mesh, ...spinMarks(shape, dark));
+      if (!glass && sinks(colour, THEMES.dark)) shells.push([holder, shell(mesh.geometry, light)]);
+    }
     group.add(holder);
   }
   group.traverse((object) => Object.assign(object, { castShadow: !glass, receiveShadow: !glass }));
-  return { group, retheme() {}, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
+  const retheme = (theme) => {
+    light.color.set(theme.steel);
+    for (const [holder, mesh] of shells) sinks(colour, theme) ? holder.add(mesh) : mesh.removeFromParent();
+  };
+  return { group, retheme, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
 }
 
 /** Points that enclose a shape, in the body's axes: the corners of its box. */
 export function cornersOf(shape) {
   const geometry = shape.kind === "mesh" ? meshGeometry(shape) : solidGeometry(shape);
-  geometry.computeBoundingBox();
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
   const { min, max } = geometry.boundingBox;
   const frame = placed(new THREE.Group(), shape);
   frame.updateMatrix();
@@ -126,6 +167,5 @@ export function cornersOf(shape) {
       for (const z of [min.z, max.z]) {
         corners.push(new THREE.Vector3(x, y, z).applyMatrix4(frame.matrix));
       }
-  geometry.dispose();
   return corners;
 }

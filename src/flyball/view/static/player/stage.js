@@ -28,7 +28,7 @@ function makeRenderer(canvas) {
 function ballAround(points) {
   const box = new THREE.Box3().setFromPoints(points);
   const centre = box.getCenter(new THREE.Vector3());
-  const radius = Math.max(...points.map((point) => point.distanceTo(centre)), 1e-6);
+  const radius = points.reduce((most, point) => Math.max(most, point.distanceTo(centre)), 1e-6);
   return { centre, radius, floor: box.min.z - 0.004 * radius };
 }
 

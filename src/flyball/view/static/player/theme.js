@@ -96,7 +96,16 @@ function hexOf(colour) {
   return pen.fillStyle.startsWith("#") ? pen.fillStyle : "#8b96a3";
 }
 
+const DARK = 0.08; // luminance of a colour that hardly differs from a dark ground
+
+/** Whether a colour hardly differs from the ground of a theme. */
+export function sinks(colour, theme) {
+  const { r, g, b } = new THREE.Color(colour);
+  return theme === THEMES.dark && 0.2126 * r + 0.7152 * g + 0.0722 * b < DARK;
+}
+
 /** The line around a flat body: its own colour, far towards ink. */
 export function outlineColour(colour, theme = THEMES.light) {
+  if (sinks(colour, theme)) return new THREE.Color(theme.steel);
   return new THREE.Color(colour).lerp(new THREE.Color(theme === THEMES.dark ? "#000000" : theme.ink), 0.72);
 }
