@@ -23,6 +23,7 @@ from .joint import Coupling, Joint
 from .messages import listing as listing
 from .messages import suggest as suggest
 from .messages import summary
+from .names import curve_parts, groups_of
 from .quantities import actual_kind, carrier_names, check_units, measured_quantity
 from .snapshot import (
     CATEGORIES,
@@ -88,6 +89,7 @@ class Model:
         self.limits: list[Unilateral] = []
         self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
+        self.groups: set[str] = {g for name in self.parameters for g in groups_of(name)}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> ParameterValues:
         """Return the values of the parameters in SI units, with some of them changed.
@@ -219,6 +221,7 @@ class Model:
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
                 self.by_name[e.name] = e
+                self.groups.update(groups_of(e.name))
             last = e
         return last
 
@@ -289,7 +292,7 @@ class Model:
 
     def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
         """Return (joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
-        owner, _, what = text.partition(".")
+        owner, what = curve_parts(text, self.by_name)
         found = self.by_name.get(owner)
         if isinstance(found, (Body, Frame)):
             axes = found.measured(self.planar)

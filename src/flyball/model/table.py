@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 from functools import cached_property
 from types import SimpleNamespace
@@ -15,6 +14,7 @@ from ..errors import ModelError, UnitError
 from ..math.spline import BREAKS, PIECE, pack_spline, spline, spline_expression
 from .element import Element, checked_size, element, python_data
 from .expression_parser import CONSTANTS, FUNCTIONS
+from .names import is_plain
 from .units import to_si
 
 Column = Annotated[tuple[float, ...], BeforeValidator(python_data)]
@@ -56,7 +56,7 @@ class Table(Element):
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse invalid points, and a name that expressions could not use."""
-        if not self.name.isidentifier() or keyword.iskeyword(self.name):
+        if not is_plain(self.name):
             raise ModelError(f"{self.title}: expressions call a table by its name; use letters, digits and _ only")
         if self.name in FUNCTIONS or self.name in CONSTANTS or self.name == "t":
             raise ModelError(f"{self.title}: the name has a meaning in expressions; call it '{self.name}_curve'")

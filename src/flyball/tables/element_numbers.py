@@ -153,10 +153,14 @@ def _parameters_of_elements(model: Model) -> dict[str, frozenset[str]]:
     return {name: frozenset(used) for name, used in found.items() if used}
 
 
+NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*)*"
+"""Pattern of a name in a law or number: ``k``, ``front_left.k``."""
+
+
 def names_in(value: Any) -> Iterator[str]:
     """Names in the texts of an element, including shapes and lists in it."""
     if isinstance(value, str):
-        yield from re.findall(r"[^\W\d]\w*", value)
+        yield from re.findall(NAME, value)
     elif isinstance(value, (tuple, list)):
         for x in value:
             yield from names_in(x)
