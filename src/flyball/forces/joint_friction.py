@@ -145,6 +145,7 @@ class JointFriction(CoordinateForce):
     twist_length: Length | None = None
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ()
     effort: ClassVar = staticmethod(effort)
     load: ClassVar = staticmethod(load)
     single: ClassVar[str] = "friction"

@@ -161,6 +161,20 @@ def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
     return _ENCLOSED.sub(replacement, text), quantities
 
 
+NAME = re.compile(r"(?<![\w.])[^\W\d]\w*(?:\.[^\W\d]\w*)*")
+"""A name in a formula: ``k``, ``left.k``."""
+
+
+def replace_names(text: str, replacement: Callable[[str], str]) -> str:
+    """Return a formula with its names replaced; units of quantities in parentheses are no names."""
+    quantities = [
+        match.span()
+        for match in _ENCLOSED.finditer(text)
+        if (parts := split_quantity(match[0].strip())) and parts[1] and not _WORDS.search(match[0])
+    ]
+    return NAME.sub(lambda m: m[0] if any(a <= m.start() < b for a, b in quantities) else replacement(m[0]), text)
+
+
 class _Reader:
     """Converts Python's syntax tree into nodes and refuses everything that is not a formula."""
 

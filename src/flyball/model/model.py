@@ -35,6 +35,7 @@ from .snapshot import (
     same_values,
     snapshot,
 )
+from .subassembly import add_subassembly
 from .table import Table
 from .units import same_kind
 from .validation import check_kind, check_name, check_references, check_vectors, checked_law, gravity_as_written
@@ -191,15 +192,51 @@ class Model:
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
         return self.by_name[name]
 
-    def add(self, *elements: Element) -> Any:
-        """Add parts and check them against the existing ones. Return the (last) part added.
+    def add(
+        self,
+        *elements: Element | Model,
+        prefix: str | None = None,
+        at: Any = None,
+        orientation: Any = None,
+        angle: Any = None,
+        mirror: str | None = None,
+        on: str = GROUND,
+        parameters: Mapping[str, Any] | None = None,
+    ) -> Any:
+        """Add parts and check them against the existing ones, or a copy of another mechanism. Return the (last) part.
+
+        ``m.add(corner, prefix="left", at=(0, 0.7, 0))`` adds all parts of the mechanism ``corner``: its body ``arm`` is
+        ``left.arm``. They are ordinary parts; a later change of ``corner`` has no effect.
+
+        Parameters
+        ----------
+        elements : parts, or one mechanism
+        prefix : str
+            Of the names of all its parts and parameters: plain words, with dots between for groups in groups.
+        at : point [m]
+            Where the origin of its world comes to be; numbers, quantities or expressions of parameters.
+        orientation : quaternion, Bryant angles [rad], rotation object or matrix
+            In space: axes of its world. They do not depend on parameters.
+        angle : number [rad]
+            In the plane.
+        mirror : {"x", "y", "z"}
+            The coordinate of its world that changes its sign before that. Laws and values of coordinates are adapted.
+        on : str
+            The body to which it is attached with all that stands on ground in it.
+        parameters : dict
+            Values of its parameters in the copy, or expressions of this mechanism's; its own where not given.
 
         Raises
         ------
         ModelError
-            If a name is taken, a body or joint it refers to is unknown, or a number is invalid.
+            If a name is taken, a body or joint it refers to is unknown, or a number is invalid; if a part of the
+            mechanism cannot be turned or reflected. Nothing of it is then added.
         """
         refuse_changes(self, "nothing can be added")
+        placed = (prefix, at, orientation, angle, mirror, on, parameters)
+        given = any(x is not None for x in placed if x is not on) or on != GROUND
+        if given or any(isinstance(e, Model) for e in elements):
+            return add_subassembly(self, elements, *placed)
         vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
         try:
             return self._add(*elements)
