@@ -8,18 +8,19 @@ formulas of coordinates themselves are evaluated to find out.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .geometry import rotation_about
-from .joint import Coordinate, Joint, WorldFrame
+from .joint import FLOATING, Coordinate, Joint, Primitive, WorldFrame
 from .placement import AXES, Placement, Written, scaled, total
 from .quantities import Quantity
 
 PLANAR_TURNING = ("omega", "alpha", "angular_velocity", "angular_acceleration")
 PLANAR_TURNING = ("omega", "alpha", "angular_velocity", "angular_acceleration")
+FLOATING_IN_PLANE = (Primitive("P", "x"), Primitive("P", "y"), Primitive("R", "z"))
 ROUNDING = 1e-9  # differences of values [m] or [rad] below which they count as equal
 
 
@@ -57,14 +58,20 @@ def _value(c: Coordinate, M: WorldFrame) -> float:
     return c.sign * float(c.row.of_kind.row((*c.row.par[:6], 0.0, 1.0), *ends, 0.0, ())[0])
 
 
-def _poses(first: np.ndarray, planar: bool) -> list[WorldFrame]:
-    """Return some poses of M in F near a rotation."""
+def _poses(chain: Sequence[Primitive], rest: np.ndarray) -> list[WorldFrame]:
+    """Return some poses of M in F that the free motions of a chain reach."""
     out = []
-    for a, b, c in ((0.0, 0.0, 0.0), (0.2, -0.1, 0.3), (-0.1, 0.3, -0.2), (0.3, 0.2, 0.1)):
-        turn = rotation_about(2, c)
-        if not planar:
-            turn = rotation_about(0, a) @ rotation_about(1, b) @ turn
-        out.append((np.array([b, c, 0.0 if planar else a]), turn @ first))
+    for amounts in ((0.0, 0.0, 0.0), (0.2, -0.1, 0.3), (-0.1, 0.3, -0.2), (0.3, 0.2, 0.1)):
+        p, R = np.zeros(3), np.eye(3)
+        for k, step in enumerate(chain):
+            axis = AXES.index(step.axis)
+            if step.kind == "P":
+                p = p + amounts[k % 3] * R[:, axis]
+            elif step.kind == "R":
+                R = R @ rotation_about(axis, amounts[k % 3])
+            else:
+                R = R @ rotation_about(0, amounts[0]) @ rotation_about(1, amounts[1]) @ rotation_about(2, amounts[2])
+        out.append((p, R @ rest))
     return out
 
 
@@ -72,8 +79,8 @@ def coordinate_image(
     coordinates: Mapping[str, Coordinate],
     what: str,
     image: Callable[[WorldFrame], WorldFrame],
-    planar: bool,
-    first: np.ndarray,
+    chain: Sequence[Primitive],
+    rest: np.ndarray,
 ) -> Image | None:
     """Return the image of a coordinate, one of the same part; None if there is none.
 
@@ -85,11 +92,12 @@ def coordinate_image(
         Name of the coordinate.
     image : function
         The pose of M in F of the image for one of the original.
-    planar : bool
-    first : (3, 3)
-        Rotation of M in F near which the coordinates are regular.
+    chain : sequence of Primitive
+        The free motions of M in F.
+    rest : (3, 3)
+        Axes of M in F in the reference configuration.
     """
-    poses = _poses(first, planar)
+    poses = _poses(chain, rest)
     old = np.array([_value(coordinates[what], M) for M in poses])
     alike = [k for k, c in coordinates.items() if c.unit == coordinates[what].unit and k != what]
     for name, sign in itertools.product([what, *alike], (1.0, -1.0)):
@@ -112,8 +120,9 @@ def located_image(what: str, table: Mapping[str, Quantity], part: Any, place: Pl
     own = part.measured(planar)
     base = what.removesuffix("_rate")
     if what in own or base in own:
+        chain = FLOATING_IN_PLANE if planar else FLOATING
         found = coordinate_image(
-            own, base, lambda M: (place.polar @ M[0], place.polar @ M[1] @ place.reflection), planar, np.eye(3)
+            own, base, lambda M: (place.polar @ M[0], place.polar @ M[1] @ place.reflection), chain, np.eye(3)
         )
         if found is None or base != what:
             return found and Image(f"{found.name}_rate", found.sign)
@@ -148,5 +157,5 @@ def joint_image(
     if base not in own:
         return None
     f, m = frames
-    found = coordinate_image(own, base, lambda M: (f @ M[0], f @ M[1] @ m.T), planar, rest)
+    found = coordinate_image(own, base, lambda M: (f @ M[0], f @ M[1] @ m.T), e.primitives(planar), rest)
     return found and found._replace(name=what if found.name == base else f"{found.name}{suffix}", shift=0.0)

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 WORDS = ("name", "color", "text", "x_unit", "y_unit", "law", "outputs")
 """Fields whose texts are no names of parts."""
+SHIFTED = ("rest", "lower", "upper", "notch", "tooth", "middle", "value")
+"""Fields that are values of the quantity along which an element acts."""
 TURNED = "its value is along the world's axes, or along axes that the copy does not have"
 
 
@@ -129,15 +131,15 @@ class Subassembly:
         owner, what = curve_parts(text)
         return self.image(text, e).name if what and owner in self.part else text
 
-    def formula(self, text: Any, inputs: Mapping[str, float] | None = None) -> Any:
+    def formula(self, text: Any, inputs: Mapping[str, str] | None = None) -> Any:
         """Return a number, a quantity, or a formula in the names of the copy."""
         if not isinstance(text, str) or is_number_text(text):
             return text
         return replace_names(text, lambda name: self._term(name, inputs or {}))
 
-    def _term(self, name: str, inputs: Mapping[str, float]) -> str:
+    def _term(self, name: str, inputs: Mapping[str, str]) -> str:
         if name in inputs:
-            return name if inputs[name] == 1.0 else f"(-{name})"
+            return inputs[name]
         owner, what = curve_parts(name, self.part)
         e = self.part.find(owner)
         if owner == ENERGY:
@@ -148,15 +150,15 @@ class Subassembly:
             return self.image(name, e).original()
         return self.image(name, e).original() if e is not None and what else name
 
-    def law(self, value: Any, e: Element, sign: float = 1.0, inputs: Mapping[str, float] | None = None) -> Any:
-        """Return a law in the names of the copy, times a sign; ``inputs`` are its inputs with their signs."""
+    def law(self, value: Any, e: Element, sign: float = 1.0, inputs: Mapping[str, str] | None = None) -> Any:
+        """Return a law in the names of the copy, times a sign; ``inputs`` are formulas of its inputs."""
         if not callable(value):
             return scaled(sign, self.formula(value, inputs))
         _, tree = function_tree(value)
         for node in tree.args:
             name = (node if node.kind == "name" else node.args[0]).value
             known = name in self.part.parameters or name in self.part
-            kept = inputs[name] == 1.0 if inputs and name in inputs else not known
+            kept = inputs[name] == name if inputs and name in inputs else not known
             if sign != 1.0 or not kept:
                 self.refuse(
                     e,
@@ -203,9 +205,11 @@ class Subassembly:
             return joint_image(what, e, self._joint_frames(e), self.planar, self._rest(e))
         along = self._along(e)
         if along and what not in ("energy", "power", "work", "intact"):
-            weighted = isinstance(e, WeightedSumForce) or not getattr(e, "odd", ())
             k = int(what[len("effort_") :]) - 1 if what.startswith("effort_") else 0
-            return Image(what, 1.0 if weighted and isinstance(e, CoordinateForce) else self.image(along[k], e).sign)
+            found = self.image(along[k], e)
+            if found.shift != 0.0 and what == next(iter(getattr(e, "outputs", ())), ""):
+                return None
+            return Image(what, 1.0 if isinstance(e, WeightedSumForce) else found.sign)
         if isinstance(e, Joint) and what in ("torque",) and self.planar:
             return Image(what, self.place.sign)
         return Image(what)
@@ -416,7 +420,7 @@ class Subassembly:
         if isinstance(e, CoordinateForce) and e.along():
             self._along_coordinates(e, new)
         else:
-            self._laws(e, new, {})
+            self._laws(e, new, {}, {})
             self._vectors(e, new)
         if isinstance(e, BodyForce):
             self._components(e, new)
@@ -440,18 +444,18 @@ class Subassembly:
                 self.refuse(e, f"its {name} has components that are Python functions; write expressions")
             new[name] = place.directions(given, axial=name == "torque")
 
-    def _laws(self, e: Any, new: dict[str, Any], signs: Mapping[str, float], inward: float = 1.0) -> None:
-        """Rename the laws of a force; ``signs``: factors of its fields, ``inward``: of the inputs of its laws."""
+    def _laws(self, e: Any, new: dict[str, Any], signs: Mapping[str, float], inputs: Mapping[str, str]) -> None:
+        """Rename the laws of a force; ``signs``: factors of its fields, ``inputs``: formulas of the laws' inputs."""
         for name in [k for k, kind in _kinds(type(e)).items() if kind == "formulas"]:
             value = getattr(e, name)
             of = fields_with(type(e), LawOf).get(name)
-            inputs = dict.fromkeys(of.inputs, inward) if of else {}
+            known = {k: inputs.get(k, k) for k in of.inputs} if of else {}
             if isinstance(value, tuple):
-                new[name] = tuple(self._law_or_points(x, e, inputs) for x in value)
+                new[name] = tuple(self._law_or_points(x, e, known) for x in value)
             elif value is not None:
-                new[name] = self.law(value, e, signs.get(name, 1.0), inputs)
+                new[name] = self.law(value, e, signs.get(name, 1.0), known)
 
-    def _law_or_points(self, value: Any, e: Any, inputs: Mapping[str, float]) -> Any:
+    def _law_or_points(self, value: Any, e: Any, inputs: Mapping[str, str]) -> Any:
         if isinstance(value, tuple):
             return tuple(self._law_or_points(x, e, inputs) for x in value)
         return self.law(value, e, 1.0, inputs)
@@ -459,21 +463,33 @@ class Subassembly:
     def _along_coordinates(self, e: Any, new: dict[str, Any]) -> None:
         """Reverse what acts along coordinates that are reversed."""
         images = [self.image(text, e) for text in self._along(e)]
-        if not all(x.shift == 0.0 for x in images):
-            self.refuse(
-                e, f"it acts along {self._along(e)[0]!r}, which is measured from the world's origin; use a joint's"
-            )
         signs = tuple(x.sign for x in images)
         factors = e.reversed_factors(signs) if min(signs, default=1.0) < 0.0 else {}
+        shift = self._shift(e, images, bool(factors))
         single = {k: x for k, x in factors.items() if not isinstance(x, tuple)}
         inward = signs[0] if factors and not isinstance(e, WeightedSumForce) else 1.0
-        self._laws(e, new, single, inward)
+        own = list(getattr(e, "outputs", ()))[:2]
+        inputs = [Image(k, inward, x).original() for k, x in zip(own, (shift, 0.0), strict=False)]
+        self._laws(e, new, single, dict(zip(own, inputs, strict=True)))
+        for name in SHIFTED if shift != 0.0 else ():
+            if (given := new.get(name)) is not None and name in fields_with(type(e), Unit):
+                new[name] = total(given, shift)
         for name, factor in factors.items():
             if isinstance(factor, tuple):
                 given = self._value(e, new, name)
                 new[name] = factor if given is None else tuple(scaled(a, x) for a, x in zip(factor, given, strict=True))
         if factors and isinstance(e, WeightedSumForce) and isinstance(e.coordinate, str):
             new["coordinate"] = (new["coordinate"],)
+
+    def _shift(self, e: Any, images: list[Image], reversed_: bool) -> Any:
+        """Return what is added to the quantity along which it acts, which is measured from another origin there."""
+        moved = [x for x in images if x.shift != 0.0]
+        if not moved or getattr(e, "value", "") is None or getattr(e, "middle", "") is None:
+            return 0.0
+        if len(images) > 1 or getattr(e, "weights", None) is not None:
+            self.refuse(e, f"{moved[0].name!r} is measured from the world's origin, and is one of a sum; use a joint's")
+        weighted = reversed_ and isinstance(e, WeightedSumForce)
+        return scaled(moved[0].sign if weighted else 1.0, moved[0].shift)
 
     def _prescribed(self, e: Any, new: dict[str, Any]) -> None:
         image = self.image(self._along(e)[0], e)
