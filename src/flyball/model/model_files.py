@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from ..errors import FlyballError, ModelError
+from .assembly_tables import ASSEMBLIES, DEFINITIONS, AssemblyTable, repeated
 from .body import Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, Material, MaterialPair
 from .contact_point import Touch
@@ -51,6 +52,8 @@ ONE_KIND = {
     "events": Event,
 }
 MUTUAL = "controllers"  # categories whose elements may refer to each other
+ORDER = tuple(x for c in CATEGORIES for x in ((c, ASSEMBLIES) if c == "bulk" else (c,)))
+"""Tables in the order in which their parts are added."""
 AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
 SELF_NAMED = ("material_pairs", "contacts")  # categories with automatic names
 MANY_KINDS = {
@@ -193,14 +196,23 @@ def read_text(path: Path) -> str:
 
 def loads(text: str, cls: type[M], source: str = "model") -> M:
     """Read a mechanism of class ``cls`` from the text of a TOML file; ``source`` names it in messages."""
-    data = parsed(text, source)
-    known = [*SETTINGS, *CATEGORIES]
+    return described(parsed(text, source), text, cls, source, {})
+
+
+def described(data: Mapping[str, Any], text: str, cls: type[M], source: str, definitions: Mapping[str, Any]) -> M:
+    """Return the mechanism of the data of a file with that text, or of a definition in it."""
+    known = [*SETTINGS, DEFINITIONS, *ORDER]
     for key, value in data.items():
         if key not in known:
             what = "table" if isinstance(value, (Mapping, list)) else "key"
             raise ModelError(f"{source}: unknown {what} {key!r}{suggest(key, known)}; a model has {', '.join(known)}")
     model = _settings(data, cls, source)
-    _add_all(model, _entries(data, text, source))
+    found = data.get(DEFINITIONS, {})
+    if not isinstance(found, Mapping) or not all(isinstance(x, Mapping) for x in found.values()):
+        raise ModelError(
+            f"{source}: {DEFINITIONS!r} must be tables of mechanisms, such as [[definitions.corner.bodies]]"
+        )
+    _add_all(model, _entries(data, text, source), {**definitions, **found}, source)
     return model
 
 
@@ -211,19 +223,24 @@ def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
     """Return (category, fields, location in the file) of every element."""
     lines = _header_lines(text)
     out = []
-    for category in CATEGORIES:
+    for category in ORDER:
         tables = data.get(category, [])
         if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
             raise ModelError(f"{source}: {category!r} must be tables, each headed [[{category}]]")
         places = lines.get(category, [])
         for k, table in enumerate(tables):
             line = f" (line {places[k]})" if len(places) == len(tables) else ""
-            name = f" {table['name']!r}" if isinstance(table.get("name"), str) else ""
-            out.append((category, table, f"{source}: [[{category}]] {k + 1}{name}{line}"))
+            named = "prefix" if category == ASSEMBLIES else "name"
+            name = f" {table[named]!r}" if isinstance(table.get(named), str) else ""
+            where = f"{source}: [[{category}]] {k + 1}{name}{line}"
+            try:
+                out += [(category, one, where) for one in repeated(table, named)]
+            except ModelError as error:
+                _refuse(error, where)
     return out
 
 
-def _add_all(model: Model, entries: list[Entry]) -> None:
+def _add_all(model: Model, entries: list[Entry], definitions: Mapping[str, Any], source: str) -> None:
     """Add every element; elements that refer to others further down in the file are added after them."""
     waiting = entries
     while waiting:
@@ -231,7 +248,7 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
         errors: list[ModelError] = []
         for entry in waiting:
             try:
-                _add(model, *entry)
+                _add(model, *entry, definitions, source)
             except ModelError as error:
                 failed.append(entry)
                 errors.append(error)
@@ -244,7 +261,7 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
     for category in AFTER_OTHERS:
-        getattr(model, category).sort(key=lambda e: place[e.name])
+        getattr(model, category).sort(key=lambda e: place.get(e.name, -1))
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:
@@ -322,7 +339,15 @@ def _header_lines(text: str) -> dict[str, list[int]]:
     return out
 
 
-def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
+def _add(
+    model: Model, category: str, table: Mapping[str, Any], where: str, definitions: Mapping[str, Any], source: str
+) -> None:
+    try:
+        if category == ASSEMBLIES:
+            AssemblyTable(**table).add_to(model, definitions, source)
+            return
+    except Exception as error:
+        _refuse(error, where)
     made = _make_element(category, table, where)
     try:
         model.add(made)
