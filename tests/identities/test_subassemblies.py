@@ -51,7 +51,9 @@ def assert_images(m: fb.Mechanism, whole: fb.Mechanism, place: Placement, t_end:
         w = place.sign * w if m.planar else w @ place.axial.T
         assert np.abs(np.array(new.angular_velocity) - w).max() < 1e-6 * (1.0 + np.abs(w).max()), b.name
     energies = [r.energy.total for r in rs]
-    assert np.abs(energies[0] - energies[0][0] - energies[1] + energies[1][0]).max() < 1e-6 * (1 + np.abs(energies[0]).max())
+    assert np.abs(energies[0] - energies[0][0] - energies[1] + energies[1][0]).max() < 1e-6 * (
+        1 + np.abs(energies[0]).max()
+    )
 
 
 @pytest.mark.parametrize("how", PLACED)

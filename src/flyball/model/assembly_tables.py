@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from contextvars import ContextVar
 from dataclasses import field
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
@@ -16,17 +14,11 @@ from .body import GROUND
 from .element import ElementType, Name, Number, Point, element, python_data
 from .expressions import Expression
 from .geometry import Orientation
-from .messages import listing, suggest
-from .shapes.mesh import current_folder
-
-if TYPE_CHECKING:
-    from .model import Model
 
 ASSEMBLIES, DEFINITIONS = "assemblies", "definitions"
 REPEAT = "repeat"
 MAX_REPEATED = 100_000  # tables that one with ``repeat`` stands for, at most
 _BRACES = re.compile(r"\{([^{}]*)\}")
-_OPEN: ContextVar[tuple[Path, ...]] = ContextVar("open", default=())  # files that are being read
 
 Values = Annotated[dict[str, Number], BeforeValidator(lambda x: {k: python_data(v) for k, v in x.items()})]
 
@@ -66,44 +58,6 @@ class AssemblyTable(metaclass=ElementType):
     mirror: Literal["x", "y", "z"] | None = None
     on: Name = GROUND
     parameters: Values = field(default_factory=dict)
-
-    def add_to(self, model: Model, definitions: Mapping[str, Any], source: str) -> None:
-        """Add the copy."""
-        model.add(
-            self._part(model, definitions, source),
-            prefix=self.prefix,
-            at=self.at,
-            orientation=self.orientation,
-            angle=self.angle,
-            mirror=self.mirror,
-            on=self.on,
-            parameters=self.parameters,
-        )
-
-    def _part(self, model: Model, definitions: Mapping[str, Any], source: str) -> Model:
-        """Return the mechanism that is copied."""
-        from .model_files import described, load
-
-        if (self.file is None) == (self.of is None):
-            raise ModelError("give file=, or of= the name of one of the definitions; one of them")
-        if self.of is not None:
-            if self.of not in definitions:
-                known = list(definitions)
-                raise ModelError(f"there is no definition {self.of!r}{suggest(self.of, known)}; {listing(known)}")
-            data = {"name": self.of, "planar": model.planar} | dict(definitions[self.of])
-            return described(data, "", type(model), f"{source}: definition {self.of!r}", definitions)
-        path = (current_folder() / str(self.file)).resolve()
-        if path.suffix.lower() != ".toml":
-            raise ModelError(
-                f"file {self.file!r} is no model file in TOML; add other mechanisms in Python: m.add(part)"
-            )
-        if path in _OPEN.get():
-            raise ModelError(f"file {self.file!r} contains itself: {' -> '.join(p.name for p in (*_OPEN.get(), path))}")
-        token = _OPEN.set((*_OPEN.get(), path))
-        try:
-            return load(path, type(model))
-        finally:
-            _OPEN.reset(token)
 
 
 def repeated(table: Mapping[str, Any], named: str) -> list[dict[str, Any]]:

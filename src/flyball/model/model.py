@@ -187,6 +187,11 @@ class Model:
 
     def __getitem__(self, name: str) -> Any:
         """Return the part with that name."""
+        if name in self.groups:
+            inner = [x.removeprefix(f"{name}.") for x in self.by_name if x.startswith(f"{name}.")]
+            raise ModelError(
+                f"{self.name!r}: {name!r} is a group of parts; name one: {name}.{inner[0]}, ...; {listing(inner)}"
+            )
         if name not in self.by_name:
             known = self.names()
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
@@ -236,10 +241,12 @@ class Model:
         placed = (prefix, at, orientation, angle, mirror, on, parameters)
         given = any(x is not None for x in placed if x is not on) or on != GROUND
         if given or any(isinstance(e, Model) for e in elements):
-            return add_subassembly(self, elements, *placed)
+            if len(elements) != 1 or not isinstance(elements[0], Model):
+                raise ModelError("prefix=, at=, mirror= and the like are for one mechanism: m.add(part, prefix='left')")
+            return add_subassembly(self, elements[0], *placed)
         vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
         try:
-            return self._add(*elements)
+            return self._add(*elements)  # type: ignore[arg-type]
         finally:
             vars(self).pop("_adding")
 

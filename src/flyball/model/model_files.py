@@ -6,6 +6,7 @@ table, type or field is refused with the line, the nearest known names and the r
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import os
 import re
@@ -13,6 +14,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from contextlib import redirect_stdout
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -27,10 +29,10 @@ from .event import Event
 from .expression_parser import function_name
 from .force import Force, Unilateral
 from .joint import Coupling, Joint
-from .messages import suggest_part
+from .messages import listing, suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
-from .shapes.mesh import Mesh, paths_from
+from .shapes.mesh import Mesh, current_folder, paths_from
 from .snapshot import CATEGORIES
 from .table import Table
 
@@ -65,6 +67,8 @@ MANY_KINDS = {
 }
 DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit"}  # default types
 SENSORS = {"Sensor": Sensor, "IMU": IMU}
+_OPEN: ContextVar[tuple[Path, ...]] = ContextVar("open", default=())  # files that are being read
+_SOURCE = ("file", "of")  # fields of the tables of assemblies that name the mechanism
 WIDTH = 100  # longer lists of shapes are written with one shape per line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
@@ -166,6 +170,7 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
     """
     path = Path(path)
     text = read_text(path)
+    token = _OPEN.set((*_OPEN.get(), path.resolve()))
     with paths_from(path.parent):
         try:
             return loads(text, cls, os.fspath(path))
@@ -173,6 +178,8 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
             if path.suffix.lower() == ".toml":
                 raise
             raise ModelError(f"{path} is no model file, these end in .toml, .py, .urdf or .xml: {error}") from None
+        finally:
+            _OPEN.reset(token)
 
 
 def read_text(path: Path) -> str:
@@ -222,7 +229,7 @@ Entry = tuple[str, Mapping[str, Any], str]
 def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
     """Return (category, fields, location in the file) of every element."""
     lines = _header_lines(text)
-    out = []
+    out: list[Entry] = []
     for category in ORDER:
         tables = data.get(category, [])
         if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
@@ -234,7 +241,7 @@ def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
             name = f" {table[named]!r}" if isinstance(table.get(named), str) else ""
             where = f"{source}: [[{category}]] {k + 1}{name}{line}"
             try:
-                out += [(category, one, where) for one in repeated(table, named)]
+                out.extend((category, one, where) for one in repeated(table, named))
             except ModelError as error:
                 _refuse(error, where)
     return out
@@ -344,7 +351,11 @@ def _add(
 ) -> None:
     try:
         if category == ASSEMBLIES:
-            AssemblyTable(**table).add_to(model, definitions, source)
+            fields = AssemblyTable(**table)
+            part = _subassembly(fields, model, definitions, source)
+            model.add(
+                part, **{f.name: getattr(fields, f.name) for f in dataclasses.fields(fields) if f.name not in _SOURCE}
+            )
             return
     except Exception as error:
         _refuse(error, where)
@@ -353,6 +364,27 @@ def _add(
         model.add(made)
     except Exception as error:
         _refuse(error, where)
+
+
+def _subassembly(table: AssemblyTable, model: M, definitions: Mapping[str, Any], source: str) -> M:
+    """Return the mechanism of which a table adds a copy."""
+    if (table.file is None) == (table.of is None):
+        raise ModelError("give file=, or of= the name of one of the definitions; one of them")
+    if table.of is not None:
+        if table.of not in definitions:
+            known = list(definitions)
+            raise ModelError(f"there is no definition {table.of!r}{suggest(table.of, known)}; {listing(known)}")
+        data = {"name": table.of, "planar": model.planar} | dict(definitions[table.of])
+        inner = {k: x for k, x in definitions.items() if k != table.of}
+        return described(data, "", type(model), f"{source}: definition {table.of!r}", inner)
+    path = (current_folder() / str(table.file)).resolve()
+    if path.suffix.lower() != ".toml":
+        raise ModelError(
+            f"file {table.file!r} is no model file in TOML; other mechanisms are added in Python: m.add(part)"
+        )
+    if path in _OPEN.get():
+        raise ModelError(f"file {table.file!r} contains itself: {' -> '.join(p.name for p in (*_OPEN.get(), path))}")
+    return load(path, type(model))
 
 
 def _make_element(category: str, table: Mapping[str, Any], where: str) -> Element:

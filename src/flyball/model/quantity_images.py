@@ -127,11 +127,12 @@ def located_image(what: str, table: Mapping[str, Quantity], part: Any, place: Pl
         if found is None or base != what:
             return found and Image(f"{found.name}_rate", found.sign)
         return found._replace(shift=place.translation[AXES.index(found.name)]) if found.name in AXES else found
-    if table[what].component is None:  # in the plane
+    component = table[what].component
+    if component is None:  # in the plane
         return Image(what, place.sign) if what in PLANAR_TURNING else None
     of = table[what].of
     names = {q.component: k for k, q in table.items() if q.of == of and q.component is not None}
-    return component_image(names, table[what].component, place.axial if of.startswith("angular") else place.polar)
+    return component_image(names, component, place.axial if of.startswith("angular") else place.polar)
 
 
 def joint_image(

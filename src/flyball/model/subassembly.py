@@ -27,7 +27,7 @@ GRAVITY_TOLERANCE = 1e-9  # relative
 
 def add_subassembly(
     whole: Model,
-    elements: tuple[Any, ...],
+    part: Model,
     prefix: Any,
     at: Any,
     orientation: Any,
@@ -37,11 +37,6 @@ def add_subassembly(
     parameters: Mapping[str, Any] | None,
 ) -> Element | None:
     """Add a copy of a mechanism: see `Model.add`. Return the last part added."""
-    from .model import Model
-
-    part = elements[0] if len(elements) == 1 else None
-    if not isinstance(part, Model):
-        raise ModelError("prefix=, at=, mirror= and the like are for one mechanism: m.add(corner, prefix='left')")
     place = _placement(whole, part, at, orientation, angle, mirror)
     who = f"the copy of {part.name!r}"
     if not isinstance(prefix, str) or not is_plain(prefix) or prefix in (*whole.groups, *whole.by_name, *RESERVED):

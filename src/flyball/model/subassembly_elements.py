@@ -341,9 +341,9 @@ class Subassembly:
         name = self.named(GROUND)
         if name not in self.whole:
             origin = (0.0,) * (2 if self.planar else 3)
-            frame, new = Frame(name, GROUND, position=origin), {"position": origin, "orientation": None, "angle": 0.0}
-            self._frame(frame, new)
-            self.whole.add(dataclasses.replace(frame, body=self.on, **{k: new[k] for k in new if new[k] is not None}))
+            new: dict[str, Any] = {"position": origin, "orientation": None, "angle": 0.0}
+            self._frame(Frame(name, GROUND, position=origin), new)
+            self.whole.add(Frame(name, self.on, **new))
         return name
 
     def _ground(self, e: Ground, new: dict[str, Any]) -> None:
@@ -446,7 +446,8 @@ class Subassembly:
 
     def _laws(self, e: Any, new: dict[str, Any], signs: Mapping[str, float], inputs: Mapping[str, str]) -> None:
         """Rename the laws of a force; ``signs``: factors of its fields, ``inputs``: formulas of the laws' inputs."""
-        for name in [k for k, kind in _kinds(type(e)).items() if kind == "formulas"]:
+        kind: Any = type(e)
+        for name in [k for k, what in _kinds(kind).items() if what == "formulas"]:
             value = getattr(e, name)
             of = fields_with(type(e), LawOf).get(name)
             known = {k: inputs.get(k, k) for k in of.inputs} if of else {}
@@ -517,7 +518,7 @@ class Subassembly:
 
     def _contact(self, e: Contact, new: dict[str, Any]) -> None:
         if e.between is None:
-            every = (*self.part.bodies, *self.part.bulk, *self.part.ground)
+            every: tuple[Any, ...] = (*self.part.bodies, *self.part.bulk, *self.part.ground)
             new["between"] = tuple(self.named(x.name) for x in every if x.shapes())
 
     def _event(self, e: Event, new: dict[str, Any]) -> None:
