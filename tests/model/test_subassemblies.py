@@ -9,8 +9,12 @@ from flyball.model.model_files import dumps, loads
 
 def pendulum(**more) -> fb.Mechanism:
     """A driven pendulum that names everything there is: parameters, a sensor, a table, a controller, an event."""
-    m = fb.Mechanism("pendulum", gravity=(0, 0, -9.81), parameters={"l": 0.4, "m": "2*l", "k": "3 N*m/rad"} | more)
-    m.add(fb.Body("bob", mass="m", inertia=("0.1*l", 0.02, 0.03), position=("l", 0, 0), shape=fb.Cone(0.05, 0.1)))
+    m = fb.Mechanism("pendulum", gravity=(0, 0, -9.81), parameters={"l": 0.4, "m": "2*l", "k": "3 N/m"} | more)
+    m.add(
+        fb.Body(
+            "bob", mass="m", inertia=("0.1*l", 0.02, 0.03), position=("l", 0, 0), shape=fb.Cone(radius=0.05, height=0.1)
+        )
+    )
     m.add(fb.Revolute("A", "ground", "bob", at=(0, 0, 0), axis=(0, 1, 0), angle="10 deg"))
     m.add(fb.Frame("tip", "bob", position=("0.5*l", 0.1, 0), orientation=("20 deg", 0, "0.1*l")))
     m.add(fb.Sensor("side", "tip.y"), fb.Sensor("turn", "A.angle"), fb.IMU("imu", "tip"))
@@ -18,7 +22,9 @@ def pendulum(**more) -> fb.Mechanism:
     m.add(fb.PID("pid", setpoint="0.1*sin(t)", measured="A.angle", kp="k", ki=1.0))
     m.add(fb.Motor("motor", "A", torque="pid - 0.1*rate + curve(side) + 0.2*pid.error*(2 m) + turn"))
     m.add(fb.SpringDamper("spring", "ground", "tip", stiffness="k", damping=0.1, length=0.3))
-    m.add(fb.PointForce("wind", "bob", force=("0.1*t", "side", 0)), fb.PointTorque("twist", "bob", torque=(0, 0.1, "t")))
+    m.add(
+        fb.PointForce("wind", "bob", force=("0.1*t", "side", 0)), fb.PointTorque("twist", "bob", torque=(0, 0.1, "t"))
+    )
     m.add(fb.Event("fast", when="A.angle > 20 deg", do=[fb.Set("k", "2*k"), fb.Set("pid.integral", 0.0)], times=1))
     m.add(fb.Initial("A.angle", rate=1.0), fb.Limit("stop", "A.angle", upper="80 deg"))
     return m
@@ -36,7 +42,7 @@ def test_names_parameters_and_laws_are_those_of_the_copy():
     assert m["left.motor"].torque == (
         "left.pid - 0.1*rate + left.curve((left.side + -1.0)) + 0.2*left.pid.error*(2 m) + left.turn"
     )
-    assert m["right.motor"].torque.startswith("right.pid - 0.1*rate + right.curve((-(right.side + 1.0)))")
+    assert m["right.motor"].torque.startswith("right.pid - 0.1*rate + right.curve(((-right.side) + -1.0))")
     assert m.parameters["left.m"] == "2*left.l" and m.parameters["right.k"] == "stiff"
     env = m.environment()
     assert (env["left.m"], env["right.m"], env["right.k"]) == (0.8, 1.0, 5.0)
@@ -51,7 +57,7 @@ def test_a_copy_moves_as_the_original_and_its_image_as_the_image():
     m.add(alone, prefix="left", at=(0, 1, 0))
     m.add(alone, prefix="right.inner", at=(2, 0, 1), mirror="y")
     one, both = (x.simulate(0.3, outputs=4, rtol=1e-10, atol=1e-12) for x in (alone, m))
-    for name in ("A.angle", "A.rate", "pid.integral", "motor.torque", "spring.tension", "imu.fx", "bob.x"):
+    for name in ("A.angle", "A.rate", "pid.integral", "motor.torque", "spring.force", "imu.fx", "bob.x"):
         for prefix, shift in (("left", 0.0), ("right.inner", 2.0 if name == "bob.x" else 0.0)):
             assert both[f"{prefix}.{name}"] == pytest.approx(one[name] + shift, rel=1e-6, abs=1e-7), (prefix, name)
     assert both["right.inner.tip.y"] == pytest.approx(-one["tip.y"], abs=1e-8)
@@ -72,9 +78,9 @@ def test_a_part_stands_on_a_body():
     assert m["top.A"].body_i == "cart" and m["top.A"].at == (1.0, 0.0, 1.0)
     ground = m["top.ground"]
     assert ground.body == "cart" and ground.position == pytest.approx((0, 0, 0.5))
-    r = m.simulate(0.0)
-    assert np.ravel(r["top.ground"].position) == pytest.approx((1, 0, 1))
-    assert np.reshape(r["top.ground"].rotation, (3, 3)) == pytest.approx(np.eye(3), abs=1e-12)
+    r = m.simulate(1e-3, outputs=2)
+    assert r["top.ground"].position[0] == pytest.approx((1, 0, 1))
+    assert np.reshape(r["top.ground"].rotation[0], (3, 3)) == pytest.approx(np.eye(3), abs=1e-12)
 
 
 def test_groups_in_groups():
@@ -82,7 +88,7 @@ def test_groups_in_groups():
     for k in (0, 1):
         pair.add(pendulum(), prefix=f"p{k}", at=(0, k, 0))
     m.add(pair, prefix="front", at=(1, 0, 0))
-    assert m["front.p1.bob"].position == ("(front.p1.l) + 1.0", 1.0, 0.0)
+    assert m["front.p1.bob"].position == ("front.p1.l + 1.0", 1.0, 0.0)
     assert m.environment()["front.p1.m"] == 0.8
     assert "front.p1.A" in m and "front" in m.groups and "front" not in m
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import ModelError
 from .expressions import is_number_text, number
 from .geometry import matrix_to_quaternion, orientation_matrix, rotation_about
+from .names import is_plain
 
 AXES = "xyz"
 EXACT = 1e-15  # entries of a rotation that differ by less from 0, 1 or -1 are these
@@ -28,6 +29,11 @@ def _plain(x: Written) -> Written:
     return number(x, {}, None, repr(x)) if isinstance(x, str) and is_number_text(x) else x
 
 
+def _enclosed(text: str) -> str:
+    """Return an expression in parentheses, unless it is a name."""
+    return text if is_plain(text) else f"({text})"
+
+
 def scaled(factor: float, x: Written) -> Written:
     """Return a number, quantity or expression times a number."""
     if factor == 1.0:
@@ -35,7 +41,7 @@ def scaled(factor: float, x: Written) -> Written:
     x = _plain(x)
     if not isinstance(x, str):
         return factor * x + 0.0
-    return f"-({x})" if factor == -1.0 else f"{factor!r}*({x})"
+    return f"-{_enclosed(x)}" if factor == -1.0 else f"{factor!r}*{_enclosed(x)}"
 
 
 def total(*terms: Written) -> Written:
@@ -45,7 +51,7 @@ def total(*terms: Written) -> Written:
         return given[0] if given else 0.0
     plain = [_plain(x) for x in given]
     constant = sum(x for x in plain if not isinstance(x, str))
-    texts = [f"({x})" for x in plain if isinstance(x, str)]
+    texts = [_enclosed(x) for x in plain if isinstance(x, str)]
     if not texts:
         return constant
     return " + ".join(texts + [repr(float(constant))] * (constant != 0.0))
@@ -60,7 +66,7 @@ def product(matrix: np.ndarray, values: Sequence[Written]) -> tuple[Written, ...
 
 def _times(a: Written, b: Written) -> Written:
     if isinstance(a, str) and isinstance(b, str):
-        return f"({a})*({b})"
+        return f"{_enclosed(a)}*{_enclosed(b)}"
     return scaled(b, a) if isinstance(a, str) else scaled(a, b) if a != 0.0 else 0.0
 
 

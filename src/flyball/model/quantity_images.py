@@ -40,8 +40,9 @@ class Image(NamedTuple):
         """Return the value of the original as a formula of the image's name."""
         if self.same:
             return self.name
-        moved = self.name if self.shift == 0.0 else str(total(self.name, scaled(-1.0, self.shift)))
-        return f"({moved})" if self.sign == 1.0 else f"(-({moved}))"
+        if self.shift == 0.0:
+            return f"(-{self.name})"
+        return f"({total(scaled(self.sign, self.name), scaled(-self.sign, self.shift))})"
 
     def of_value(self, value: Written) -> Written:
         """Return the image's value for one of the original."""

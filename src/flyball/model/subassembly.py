@@ -74,10 +74,8 @@ def _placement(whole: Model, part: Model, at: Any, orientation: Any, angle: Any,
     """Return where a copy is placed, checked."""
     who = f"the copy of {part.name!r}"
     if part is whole or part.planar != whole.planar:
-        kinds = " and ".join("planar" if m.planar else "spatial" for m in (part, whole))
-        why = (
-            "a mechanism has no copy of itself" if part is whole else f"it is {kinds.replace(' and ', ', the whole ')}"
-        )
+        one, other = ("planar" if m.planar else "spatial" for m in (part, whole))
+        why = "a mechanism is no part of itself" if part is whole else f"it is {one}, and that is {other}"
         raise ModelError(f"{who} cannot be added to {whole.name!r}: {why}")
     axes, n = ("xy", 2) if whole.planar else ("xyz", 3)
     if mirror is not None and mirror not in tuple(axes):
