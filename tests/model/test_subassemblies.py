@@ -159,3 +159,16 @@ def test_a_file_is_a_part_of_another(tmp_path):
     m = fb.Mechanism("both", gravity=(0, 0, -9.81))
     m.add(pendulum(), prefix="b", mirror="x")
     assert fb.load(tmp_path / "both.toml") == m
+
+
+def test_results_and_summaries_are_by_group():
+    m = two()
+    r = m.simulate(0.01, outputs=2)
+    left = r["left"]
+    assert (left["bob.x"] == r["left.bob.x"]).all() and (left["bob"].position == r["left.bob"].position).all()
+    assert "left" in r and "bob.x" in left and "bob.q" not in left and "left.bob.x" not in left
+    assert left.parts()[0] == "bob" and "A.angle" in left.names()
+    with pytest.raises(fb.ModelError, match=r"'left' has no part named 'bop' \(did you mean 'bob'\?\)"):
+        left["bop.x"]
+    assert "bodies     2: left.bob, right.bob" in str(m) and "sensors    6: left.* (3), right.* (3)" in str(m)
+    assert "parameters 7: stiff = 5.0, left.* (3), right.* (3)" in str(m)

@@ -38,7 +38,9 @@ def corner(m: fb.Mechanism, prefix: str, x: float, side: int, height: float, ahe
     m.add(fb.Distance(name("tie rod"), "chassis", name("upright"), at=rod))
     m.add(fb.Fixed(name("bearing"), name("upright"), name("wheel"), at=at((0, 0.78, 0.3))))
     ends = (at((0, 0.44, 0.62)), at((0, 0.58, 0.187)))
-    m.add(fb.SpringDamper(name("strut"), "chassis", name("lower arm"), at=ends, stiffness=4e4, damping=3e3, length=0.58))
+    m.add(
+        fb.SpringDamper(name("strut"), "chassis", name("lower arm"), at=ends, stiffness=4e4, damping=3e3, length=0.58)
+    )
     way = f"(10*t - {ahead})"
     road = f"{2e5 * height}*step5({way}, 0, 0, 0.5, 1)*step5({way}, 0.5, 1, 1, 0)"
     m.add(fb.CoordinateSpring(name("tyre"), name("hub.z"), stiffness=2e5, damping=200.0, rest=0.3, force=road))

@@ -36,6 +36,7 @@ from .motion_record import MeasuredQuantities, MotionRecord, RecordedMotion, rec
 from .part_views import has_view, view_of
 from .part_views.base import SplicedView
 from .part_views.bodies import SET_MOTION_ARRAYS, BodySetMotion, BodySetView, SetMemberView
+from .part_views.groups import GroupView
 from .reactions import EventImpulses, JointReactions
 from .wording import range_text
 
@@ -237,7 +238,7 @@ class Result:
         return JointReactions(self)
 
     def __getitem__(self, name: str) -> Any:
-        """Return a part by its name, or one of its quantities by ``"part.quantity"``.
+        """Return a part by its name, a group of parts, or a quantity of a part by ``"part.quantity"``.
 
         Raises
         ------
@@ -248,11 +249,14 @@ class Result:
             raise ModelError(
                 f"a result is read by name, for instance result['crank'] or result['crank.x'], not {name!r}"
             )
-        return self.channel(name)[1] if curve_parts(name, self.model)[1] else self._view(name)
+        whole = name in self.model.groups or not curve_parts(name, self.model)[1]
+        return self._view(name) if whole else self.channel(name)[1]
 
     def __contains__(self, name: object) -> bool:
         """Return whether there is a part, or a quantity, of that name."""
         owner, what = curve_parts(name, self.model) if isinstance(name, str) else ("", "")
+        if name in self.model.groups:
+            return True
         if owner not in self.parts() and self.set_of_bodies(owner) is None:
             return False
         return not what or what in self._view(owner).names
@@ -266,6 +270,8 @@ class Result:
     def _viewed(self, name: str) -> Any:
         if name == ENERGY:
             return self.energy
+        if name in self.model.groups:
+            return GroupView(self, name)
         if (found := self.set_of_bodies(name)) is None:
             if self.pieces:
                 return SplicedView([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
