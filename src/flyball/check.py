@@ -265,7 +265,9 @@ def _names_used(model: Model) -> set[str]:
         + repr(model.gravity)
         + repr(list(model.parameters.values()))
     )
-    return set(re.findall(r"\w+", text)).union(*(inspect.signature(f).parameters for f in _law_functions(model)))
+    return set(re.findall(r"\w+(?:\.\w+)*", text)).union(
+        *(inspect.signature(f).parameters for f in _law_functions(model))
+    )
 
 
 def _law_functions(model: Model) -> Iterator[Callable]:

@@ -59,7 +59,7 @@ PLANAR = [
         "the name is taken by Body 'crank'; names must be unique",
     ),
     (fb.Revolute, ("ground", "ground", "crank"), {"at": (0, 0)}, "the name 'ground' is reserved"),
-    (fb.Revolute, ("A.b", "ground", "crank"), {"at": (0, 0)}, r"'A\.b' is no good name"),
+    (fb.Revolute, ("A..b", "ground", "crank"), {"at": (0, 0)}, r"'A\.\.b' is no good name"),
     (
         fb.Revolute,
         ("A", "ground", "crank"),

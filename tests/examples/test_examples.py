@@ -44,6 +44,7 @@ PROMISED = {
     "cam.py",
     "cam_follower.toml",
     "capstan.toml",
+    "car.toml",
     "car_axis.toml",
     "cart_pole_swing_up.py",
     "chaplygin_sleigh.toml",

@@ -71,7 +71,7 @@ def test_every_public_element_and_action_is_described(cls):
     for name, field in table["properties"].items():
         assert field["description"], name
         assert {"type", "anyOf", "$ref"} & set(field), name
-    assert set(table["properties"]) - {"type"} == {f.name for f in dataclasses.fields(cls)}
+    assert set(table["properties"]) - {"type", "repeat"} == {f.name for f in dataclasses.fields(cls)}
 
 
 def test_units_defaults_and_choices_are_told():

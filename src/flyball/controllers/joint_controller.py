@@ -15,6 +15,7 @@ from ..model.controller import Controller, ControlState
 from ..model.element import Law, Laws, Name, Number, element, python_data
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import number
+from ..model.names import curve_parts
 from ..model.units import split_quantity
 
 if TYPE_CHECKING:
@@ -64,8 +65,10 @@ class JointController(Controller):
     @property
     def output_names(self) -> tuple[str, ...]:
         """Return the joints' names; with the coordinate's name where a joint has several that are controlled."""
-        joints = Counter(c.partition(".")[0] for c in self.coordinates)
-        named = [(*c.partition(".")[::2],) for c in self.coordinates]
+        own = f"{curve_parts(self.name)[0]}." if "." in self.name else ""
+        named = [curve_parts(c) for c in self.coordinates]
+        named = [(joint.removeprefix(own).replace(".", "_"), what) for joint, what in named]
+        joints = Counter(joint for joint, _ in named)
         return tuple(joint if joints[joint] == 1 else f"{joint}_{what}" for joint, what in named)
 
     @property
@@ -90,8 +93,8 @@ class JointController(Controller):
     def examine(self, model: Model) -> None:
         """Refuse coordinates, bodies and parameters that do not exist."""
         for text in self.coordinates:
-            joint, dot, what = text.partition(".")
-            model.joint(joint, self, what if dot else "")
+            joint, what = curve_parts(text)
+            model.joint(joint, self, what)
         for name in (*((self.base,) if self.base else ()), *self.ignored):
             model.body(name, self)
         env = model.environment()

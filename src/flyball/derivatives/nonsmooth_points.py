@@ -24,6 +24,7 @@ from ..model.element import LawOf, fields_with
 from ..model.expressions import Expression
 from ..model.force import CoordinateForce
 from ..model.model import Model
+from ..model.names import is_curve
 from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative, state_sizes
 from .output_derivatives import curve_gradients, snapshot
 
@@ -282,7 +283,7 @@ def _controller_functions(
 def _law_arguments(model: Model, law: Expression, inputs: dict[str, str], to: Sequence[str]) -> dict[str, str]:
     """Arguments of a law besides time: name in the law -> curve (a parameter stands for itself)."""
     sensors = {x.name: f"{x.name}.value" for x in model.sensors}
-    curves = sensors | inputs | {name: name for name in (*to, *law.names) if name in to or "." in name}
+    curves = sensors | inputs | {name: name for name in (*to, *law.names) if name in to or is_curve(model, name)}
     return {name: curves[name] for name in sorted(law.names) if name in curves}
 
 

@@ -34,6 +34,7 @@ from ..model.element import Element
 from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode, called_table
 from ..model.expressions import Expression, is_number_text, number
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..tables.coordinate_choice import require_rotor_coordinates, rotors, spanning_joints
 from ..tables.forest import joint_bodies
 from ..tables.structure import Choices, structure
@@ -375,7 +376,7 @@ def controlled_robot(model: Model, e: JointController) -> Model:
                 reached.add(other)
                 waiting.append(other)
     _refuse_unreached(model, e, joints, base)
-    kept = reached | joints | {f.name for f in rotors(model) if f.coordinate_text().partition(".")[0] in joints}
+    kept = reached | joints | {f.name for f in rotors(model) if curve_parts(f.coordinate_text())[0] in joints}
     kept |= {f.name for f in model.frames if f.body in reached} | {x.name for x in model.materials}
     parts: dict[str, Any] = {name: None for name in model.by_name if name not in kept}
     robot = model.changed(parts)
@@ -391,13 +392,13 @@ def controlled_robot(model: Model, e: JointController) -> Model:
 def _refuse_unreached(model: Model, e: JointController, joints: set[str], base: str) -> None:
     """Refuse controlled joints beyond the robot, and couplings within."""
     for coordinate in e.coordinates:
-        name = coordinate.partition(".")[0]
+        name = curve_parts(coordinate)[0]
         if name not in joints:
             raise ModelError(
                 f"{e.title}: no joints connect {name!r} with {base!r}; give base=, the body that carries the joints"
             )
     for c in model.couplings:
-        if not joints.isdisjoint(x.partition(".")[0] for x in c.coupled()):
+        if not joints.isdisjoint(curve_parts(x)[0] for x in c.coupled()):
             raise ModelError(
                 f"{e.title}: {c.title} couples joints of its model, and the model is a tree of independent joints; "
                 f"leave the bodies that it drives out of the model, ignored=[...]"

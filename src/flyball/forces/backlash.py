@@ -93,6 +93,11 @@ class Backlash(Unilateral):
         for text in self.coordinates:
             model.coordinate(text, self)
 
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factors of the weights, and of the sum's value in the middle, which is relative to the first."""
+        first = (1.0, -1.0)[: len(signs)] if self.weights is None else (1.0,) * len(signs)
+        return {"weights": tuple(a * b for a, b in zip(first, signs, strict=True)), "middle": signs[0]}
+
     def check(self, n: SimpleNamespace) -> None:
         """Require a gap, and a nonzero weight for each of different coordinates."""
         positive(self, n, "gap", why="Without any play it is a Coupler or a GearPair")

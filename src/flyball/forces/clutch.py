@@ -141,6 +141,7 @@ class Clutch(CapacityFriction, CoordinateForce):
     capacity: Annotated[Law, LawOf(None, ("slip", "rate"))]
     static: Ratio = 1.0
 
+    odd: ClassVar[tuple[str, ...]] = ()
     outputs: ClassVar[dict[str, str]] = {"slip": "", "rate": "/s", "friction": "effort"}
 
     def along(self) -> tuple[str, ...]:

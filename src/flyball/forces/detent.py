@@ -63,6 +63,7 @@ class Detent(CoordinateForce):
     damping: Annotated[Number, Unit(None)] = 0.0
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ("notch",)
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = CoordinateForce.dimensions | {

@@ -16,6 +16,7 @@ from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce, Switch
 from ..model.joint import Joint
+from ..model.names import curve_parts
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -144,6 +145,7 @@ class JointFriction(CoordinateForce):
     twist_length: Length | None = None
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ()
     effort: ClassVar = staticmethod(effort)
     load: ClassVar = staticmethod(load)
     single: ClassVar[str] = "friction"
@@ -203,7 +205,7 @@ class JointFriction(CoordinateForce):
         if self.coordinate == THREAD:
             self._examine_thread(model)
             return
-        what = self.coordinate_text().partition(".")[2]
+        what = curve_parts(self.coordinate_text())[1]
         joint = model.joint(self.joint, self, what)
         if joint.coordinates[what].singular:
             raise ModelError(

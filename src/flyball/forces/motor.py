@@ -25,6 +25,7 @@ class Motor(JointForce):
     torque: Annotated[Law, LawOf("N*m", ("angle", "rate"))]
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ("torque",)
     effort: ClassVar = staticmethod(effort)
     outputs: ClassVar[dict[str, str]] = {"angle": "rad", "rate": "rad/s", "torque": "N*m"}
 

@@ -46,6 +46,8 @@ class OneWay(Latch):
     relative_to: str | None = None
     direction: Annotated[Number, Unit("1")] = 1.0
 
+    odd: ClassVar[tuple[str, ...]] = ("direction",)
+
     def check(self, n: SimpleNamespace) -> None:
         """Require a valid direction."""
         check_direction(self, n.direction.real)
@@ -93,6 +95,8 @@ class Ratchet(Latch):
     relative_to: str | None = None
     direction: Annotated[Number, Unit("1")] = 1.0
     restitution: Ratio = 0.0
+
+    odd: ClassVar[tuple[str, ...]] = ("direction", "tooth")
 
     dimensions: ClassVar = Latch.dimensions | {"pitch": ("m", "rad"), "tooth": ("m", "rad")}
 

@@ -50,6 +50,7 @@ class RotorInertia(CoordinateForce):
     ratio: Annotated[Number, Unit(None)] = 1.0
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ()
     effort: ClassVar = staticmethod(effort)
     adds_inertia: ClassVar[bool] = True
     dimensions: ClassVar = {"ratio": ("rad/m", "1")}

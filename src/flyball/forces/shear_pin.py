@@ -72,6 +72,7 @@ class ShearPin(Unilateral):
     relative_to: str | None = None
     strength: Annotated[Number, Unit(None)]
 
+    odd: ClassVar[tuple[str, ...]] = ()
     dimensions: ClassVar = Unilateral.dimensions | {"strength": ("N", "N*m")}
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort", "intact": "1"}
 

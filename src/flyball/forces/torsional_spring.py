@@ -36,6 +36,7 @@ class TorsionalSpringDamper(JointForce):
     torque: Annotated[Law | None, LawOf("N*m", ("angle", "rate"))] = None
 
     kind: ClassVar[int] = KIND
+    odd: ClassVar[tuple[str, ...]] = ("angle", "torque")
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"angle": "rad", "rate": "rad/s", "torque": "N*m"}

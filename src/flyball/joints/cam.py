@@ -81,6 +81,7 @@ class Cam(Joint):
     groove: Flag = False
 
     blocks: ClassVar = (CURVE,)
+    local: ClassVar[tuple[str, ...]] = ("points",)
     needs_axis: ClassVar[bool] = True
     symbol: ClassVar[str] = "cam"
     one_sided: ClassVar[bool] = True

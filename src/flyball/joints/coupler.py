@@ -56,6 +56,10 @@ class Coupler(Coupling):
         """Return the value as given."""
         return n.value
 
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factors of the weights."""
+        return {"weights": signs}
+
     def check(self, n: SimpleNamespace) -> None:
         """Require a nonzero weight for each of at least two different coordinates."""
         if len(self.coordinates) < 2:

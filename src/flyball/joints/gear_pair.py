@@ -63,6 +63,10 @@ class GearPair(Coupling):
         remedy = "both gears must turn on one carrier: put a Revolute between each gear and the arm that carries them"
         return shared_body(self, model, self.joint_1, self.joint_2, remedy)
 
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return no factors: both gears must be reversed."""
+        return {} if signs[0] == signs[1] else super().reversed_factors(signs)
+
     def check(self, n: SimpleNamespace) -> None:
         """Require two positive numbers of teeth."""
         if len(n.teeth) != 2 or not all(z.real > 0.0 for z in n.teeth):

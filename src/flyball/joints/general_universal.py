@@ -50,6 +50,7 @@ class GeneralUniversal(Joint):
     }
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
+    axial: ClassVar[bool] = True
     symbol: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:

@@ -48,6 +48,10 @@ class RackAndPinion(Coupling):
         """Return the factors of: displacement - radius * angle = constant."""
         return 1.0, -n.radius
 
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factor of the radius."""
+        return {"radius": signs[0] * signs[1]}
+
     def check(self, n: SimpleNamespace) -> None:
         """Require a radius."""
         if n.radius == 0.0:

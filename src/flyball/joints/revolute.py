@@ -32,6 +32,7 @@ class Revolute(Joint):
     coordinates: ClassVar = {"angle": Coordinate(ANGLE, offset="angle")}
     chain: ClassVar = (Primitive("R", coordinate="angle"),)
     needs_axis: ClassVar[bool] = True
+    axial: ClassVar[bool] = True
     symbol: ClassVar[str] = "revolute"
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..constraints.blocks import ANGLE, PARALLEL_AXES, SLIDE, STRAIGHT_LINE
 from ..errors import ModelError
@@ -49,6 +49,10 @@ class Screw(Joint):
     symbol: ClassVar[str] = "screw"
     thread: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factors of the drawn values, and of the lead, which relates the coordinates."""
+        return super().reversed_factors(signs) | {"lead": signs[0] * signs[1]}
 
     def check(self, n: SimpleNamespace) -> None:
         """Require a lead other than zero."""

@@ -46,6 +46,7 @@ class Universal(Joint):
     rest: ClassVar = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
+    axial: ClassVar[bool] = True
     symbol: ClassVar[str] = "universal"
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 1.0

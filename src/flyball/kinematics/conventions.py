@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import AnalysisError, ModelError
 from ..math.vec import quaternion_matrix, quaternion_product
+from ..model.names import curve_parts
 from ..rotations.arrays import joined, quaternion_of, split
 from ..tables.table_definitions import FREE, PLANAR, POINT, REVOLUTE, SPHERICAL, Tree
 
@@ -364,7 +365,7 @@ def convention(
     if program not in PROGRAMS:
         raise ModelError(f"{program!r} is no program whose conventions are known: {', '.join(PROGRAMS)}")
     tree, name = x.system.tree, x.structure.model.name
-    owners = [n.partition(".")[0] for n in x.names]
+    owners = [curve_parts(n)[0] for n in x.names]
     if joints is not None:
         order = _in_their_order(x, owners, joints)
     elif (x.paths.previous == np.arange(-1, len(owners) - 1)).all():
@@ -421,7 +422,7 @@ def _in_their_order(x: BatchDynamics, owners: Sequence[str], joints: Sequence[st
 def continuous_joints(x: BatchDynamics, stopped: Collection[str]) -> list[str]:
     """Joints that turn about one axis without a stop: Pinocchio stores the angle as cosine and sine."""
     turning = [x.names[d] for d, b in enumerate(x.paths.body) if x.system.tree.joint[b] == REVOLUTE]
-    return [name.partition(".")[0] for name in turning if name not in stopped]
+    return [curve_parts(name)[0] for name in turning if name not in stopped]
 
 
 def _unit(e: Array) -> Array:

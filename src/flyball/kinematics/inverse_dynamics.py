@@ -27,6 +27,7 @@ from ..model.controller import Sensor
 from ..model.geometry import matrix_to_quaternion
 from ..model.joint import Coupling
 from ..model.model import Model, listing, suggest
+from ..model.names import is_curve
 from ..model.table import Table
 from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import MAX_DOUBTFUL_SVD_SIZE, MAX_SVD_SIZE, fundamental_subspaces, rank_by_pivots
@@ -263,7 +264,7 @@ def _add_driver(model: Model, label: str, motion: Any, times: np.ndarray, labels
 
 def _driven_coordinate(model: Model, label: str) -> str:
     """Return the coordinate that a name in the motion refers to."""
-    if "." in label:
+    if is_curve(model, label):
         return label
     if not isinstance(e := model.find(label), Sensor):
         known = [x.name for x in model.sensors if isinstance(x, Sensor)]

@@ -36,6 +36,7 @@ from ..model.contact import has_switching_elements
 from ..model.controller import Controller, Sensor
 from ..model.element_laws import Input, with_inputs
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.quantities import ENERGY, single_quantity
 from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
@@ -383,9 +384,9 @@ def refuse_cumulative_outputs(model: Model, names: Sequence[str]) -> None:
     """
     for name in names:
         of = str(name)
-        while "." not in of and isinstance(e := model.find(of), Sensor):
+        while isinstance(e := model.find(of), Sensor):
             of = e.of
-        owner, _, what = of.partition(".")
+        owner, what = curve_parts(of, model)
         if (
             what in CUMULATIVE_OUTPUTS_OF_ENERGY
             if owner == ENERGY

@@ -21,6 +21,7 @@ from ..errors import AnalysisError, ModelError, SingularityError
 from ..model.element import Element
 from ..model.expressions import number
 from ..model.model import Model
+from ..model.names import groups_of
 from ..model.unsupported_elements import unsupported_elements
 from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, Equilibrium, Touch
 from ..results.result import Result
@@ -118,7 +119,7 @@ def _assembly_at_equilibrium(model: Model, about: Equilibrium, parameters: Mappi
     old = about.assembly.compiled
     if about.preload:
         own = old.structure.model
-        loaded = {name.partition(".")[0] for name in about.preload}
+        loaded = {x for name in about.preload for x in (*groups_of(name), name)}
         parts, others = ([e for e in m.elements() if e.name not in loaded] for m in (model, own))
         if parts != others:
             raise ModelError(f"{model.name!r} has changed since its preload was computed; compute it again")

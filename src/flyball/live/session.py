@@ -34,6 +34,7 @@ import numpy as np
 
 from ..errors import FlyballError, ModelError, SimulationError
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..results.result import Result
 from ..view.animation import record_motion
 from ..view.page import pack_recording
@@ -379,7 +380,7 @@ class LiveSession:
         model = self._known_model()
 
         def known(name: str) -> bool:
-            owner, _, what = name.partition(".")
+            owner, what = curve_parts(name)
             return name in KNOWN_ENERGIES or (owner in model.by_name and not what.startswith("contact_"))
 
         return dataclasses.replace(

@@ -26,6 +26,7 @@ from ..model.body import Body, Driver, Initial
 from ..model.geometry import orientation_matrix
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.unsupported_elements import ignored_elements
 from ..numerics.rank import (
     MAX_DOUBTFUL_SVD_SIZE,
@@ -131,8 +132,8 @@ def _named_motions(a: Assembly, basis: np.ndarray, bodies: list[str], names: lis
     size = velocity_scales(c)
     joints = {j.name for j in s.model.joints}
     moving = set(bodies)
-    first = [k for k, name in enumerate(names) if name.partition(".")[0] in joints]
-    later = [k for k, name in enumerate(names) if name.partition(".")[0] in moving]
+    first = [k for k, name in enumerate(names) if curve_parts(name)[0] in joints]
+    later = [k for k, name in enumerate(names) if curve_parts(name)[0] in moving]
     turns = (
         np.zeros((0, s.nv)) if s.model.planar else np.vstack([_angular_velocity_rows(c, s.place[b]) for b in bodies])
     )

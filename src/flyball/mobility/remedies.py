@@ -32,6 +32,7 @@ from ..model.geometry import triad, vector
 from ..model.joint import Coupling, Joint
 from ..model.messages import kind_in_words
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..numerics.rank import column_space, fundamental_subspaces, null_space
 from ..results.mobility import JointChange, Remedy
 from .null_spaces import ConstraintNullSpaces, velocity_scales
@@ -299,7 +300,7 @@ def _used_coordinates(model: Model, e: Any) -> set[str]:
     texts += [x.of for x in model.sensors if isinstance(x, Sensor)]
     if isinstance(e, Driver):
         return set()
-    return {what for owner, _, what in (t.partition(".") for t in texts if t) if owner == e.name}
+    return {what for owner, what in (curve_parts(t) for t in texts if t) if owner == e.name}
 
 
 MAX_ELEMENTS = 40  # largest number of elements of a set that are tried

@@ -204,6 +204,7 @@ class Body(Located):
     color: str | None = None
 
     category: ClassVar[str] = "bodies"
+    local: ClassVar[tuple[str, ...]] = ("com", "inertia_about", "inertia_axes")
 
     hints: ClassVar[dict[str, str]] = {
         "fixed": "to weld it to ground add a Fixed joint; to keep assembly from moving it, as_drawn=True"

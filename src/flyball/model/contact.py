@@ -218,6 +218,7 @@ class Material(Element):
     poissons_ratio: Ratio | None = None
 
     category: ClassVar[str] = "materials"
+    local: ClassVar[tuple[str, ...]] = ("grain", "surface_velocity")
 
     def check(self, n: SimpleNamespace) -> None:
         """Require valid surface properties; a grain if, and only if, two friction coefficients are given."""

@@ -18,6 +18,7 @@ from .element import LawOf, resolve
 from .expression_parser import SyntaxNode, call_node
 from .expressions import Expression
 from .messages import suggest
+from .names import curve_parts
 
 if TYPE_CHECKING:
     from .model import Model
@@ -46,14 +47,14 @@ def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode
     parts = _linear(tree, name)
     if parts is None:
         raise ModelError(
-            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant, and not linearly (limits, "
+            f"{whose}: its {curve_parts(name)[1]} depends on itself at the same instant, and not linearly (limits, "
             f"products, functions): {ring}. Have one of them go through a state, as a Lag or an Integrator has, or "
             f"sample one of the controllers (period=...)"
         )
     a, b = parts
     if a.kind == "number" and abs(a.value - 1.0) <= SINGULAR_GAIN:
         raise ModelError(
-            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, so it is "
+            f"{whose}: its {curve_parts(name)[1]} depends on itself at the same instant with the gain 1, so it is "
             f"not determined: {ring}. Add a state to this loop, with a Lag or an Integrator"
         )
     return _over(b, _plus(ONE, _minus(a)))
@@ -312,11 +313,11 @@ class _SignalGraph:
         """Return a law's tree with signals substituted."""
 
         def found(node: SyntaxNode) -> SyntaxNode | None:
-            owner, dot, what = node.value.partition(".")
+            owner, what = curve_parts(node.value, self.all)
             e = self.all.get(owner)
             if e is None:
                 return None
-            name = what if dot else e.bare
+            name = what or e.bare
             return self.signal(e, name) if name in self.own[owner] else None
 
         return self.limited(_replaced(tree, found), "a law")
@@ -350,7 +351,7 @@ def _at(tree: SyntaxNode, start: int) -> SyntaxNode:
 def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
     """Refuse controllers in the law of a driver, which needs derivatives that controllers' signals do not have."""
     for name in sorted(law.names):
-        owner = name.partition(".")[0]
+        owner = curve_parts(name, controllers_by_name(model))[0]
         if owner in controllers_by_name(model):
             raise ModelError(
                 f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes a motion and "
@@ -363,13 +364,13 @@ def refuse_unknown(model: Model, law: Expression) -> None:
     """Refuse unknown signals of a controller."""
     all_, known = controllers_by_name(model), set(signal_names(model))
     for name in sorted(law.names - known):
-        if name.partition(".")[0] in all_:
+        if curve_parts(name, all_)[0] in all_:
             raise ExpressionError(f"'{law}': {_unknown(model, name)}")
 
 
 def _unknown(model: Model, name: str) -> str:
     """Return the message on an unknown name whose owner is a controller."""
-    owner, _, what = name.partition(".")
+    owner, what = curve_parts(name, controllers_by_name(model))
     e = controllers_by_name(model)[owner]
     own = controller_names(model, e)
     if not what:

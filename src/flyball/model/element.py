@@ -270,6 +270,8 @@ class Element(metaclass=ElementType):
     in_files: ClassVar[bool] = True  # whether model files may name it; its name is then in the registry
     registry: ClassVar[dict[str, type[Element]]] = {}
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
+    local: ClassVar[tuple[str, ...]] = ()  # vectors and orientations along its own or its body's axes, not the world's
+    mirrors: ClassVar[bool] = False  # of an own element: whether its formulas hold for it turned or reflected as well
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -314,6 +316,18 @@ class Element(metaclass=ElementType):
     def bound(self, model: Any) -> Element:
         """Return the element with properties that depend on the model's other elements; by default itself."""
         return self
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return factors of its fields if the directions of its coordinates are multiplied by these signs.
+
+        A tuple has a factor for each component of a field.
+
+        Raises
+        ------
+        ModelError
+            If it cannot act along a reversed coordinate.
+        """
+        raise ModelError(f"{self.title}: a {type(self).__name__} cannot act along a coordinate that is reversed")
 
     def acts(self) -> bool:
         """Return whether it acts by a formula; if not, it only has rows that are active at times (`switches`)."""

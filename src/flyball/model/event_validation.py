@@ -13,6 +13,7 @@ from .event import START, Action, Event, Impulse, Lock, Release, Set, Stop, comp
 from .expressions import is_number_text
 from .joint import Joint
 from .messages import listing, suggest
+from .names import curve_parts, is_curve
 from .quantities import quantities
 from .units import same_kind
 
@@ -52,7 +53,7 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
         If there is no such part, or it cannot be locked or released.
     """
     what = f"{e.title}: {a.title}"
-    if "." in a.what:
+    if is_curve(model, a.what):
         model.coordinate(a.what, e)
         return LockTarget((a.what,))
     found = model.find(a.what)
@@ -133,7 +134,7 @@ def _refuse_unlike(model: Model, e: Event) -> None:
     if not isinstance(e.when, str) or (sides := comparison_sides(e.when, e)) is None:
         return
     for curve, quantity in (sides, sides[::-1]):
-        name, _, what = curve.partition(".")
+        name, what = curve_parts(curve, model)
         if what and model.find(name) is not None and is_number_text(quantity):
             known = quantities(model, name).get(what)
             if known is not None and known.unit:
@@ -205,7 +206,7 @@ def _check_impulse(model: Model, e: Event, a: Impulse) -> None:
 def coordinate_of(model: Model, e: Event, a: Impulse) -> str:
     """Return the coordinate along which an impulse acts: one that is named, or the only one of a joint."""
     found = model.find(a.on)
-    if "." in a.on:
+    if is_curve(model, a.on):
         model.coordinate(a.on, e)
         return a.on
     if not isinstance(found, Joint):

@@ -118,18 +118,22 @@ def tree_text(node: SyntaxNode) -> str:
 
 
 def parse_text(
-    text: str, tables: Mapping[str, Sequence[str]] = MappingProxyType({}), curves: bool = False
+    text: str,
+    tables: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    curves: bool = False,
+    dotted: Collection[str] = (),
 ) -> tuple[str, SyntaxNode]:
     """Return the text on one line, and its tree; `ExpressionError` if it is not a formula.
 
-    ``tables``: arguments of tables by name; ``curves``: whether names may have dots, such as A.angle.
+    ``tables``: arguments of tables by name; ``curves``: whether names may have dots, such as A.angle; ``dotted``: names
+    that have some in any case.
     """
     text = "".join(" " if c.isspace() else c for c in text).strip()
     if not text:
         raise ExpressionError("the expression is empty; write a number, a quantity such as '5 mm', or a formula")
     try:
         masked, quantities = _masked(text)
-        return text, _Reader(text, masked, quantities, tables, curves).read(ast.parse(masked, mode="eval").body)
+        return text, _Reader(text, masked, quantities, tables, curves, dotted).read(ast.parse(masked, mode="eval").body)
     except SyntaxError as error:
         start = (error.offset or 1) - 1
         refuse_expression(text, start, start + 1, f"cannot read the expression ({error.msg})", _remedy(text))
@@ -161,6 +165,20 @@ def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
     return _ENCLOSED.sub(replacement, text), quantities
 
 
+NAME = re.compile(r"(?<![\w.])[^\W\d]\w*(?:\.[^\W\d]\w*)*")
+"""A name in a formula: ``k``, ``left.k``."""
+
+
+def replace_names(text: str, replacement: Callable[[str], str]) -> str:
+    """Return a formula with its names replaced; units of quantities in parentheses are no names."""
+    quantities = [
+        match.span()
+        for match in _ENCLOSED.finditer(text)
+        if (parts := split_quantity(match[0].strip())) and parts[1] and not _WORDS.search(match[0])
+    ]
+    return NAME.sub(lambda m: m[0] if any(a <= m.start() < b for a, b in quantities) else replacement(m[0]), text)
+
+
 class _Reader:
     """Converts Python's syntax tree into nodes and refuses everything that is not a formula."""
 
@@ -171,11 +189,12 @@ class _Reader:
         quantities: dict[str, tuple[float, int]],
         tables: Mapping[str, Sequence[str]],
         curves: bool = False,
+        dotted: Collection[str] = (),
     ) -> None:
         self.text = text
         self.masked = masked  # text as Python parses it, with unchanged length
         self.quantities = quantities
-        self.tables, self.curves = tables, curves
+        self.tables, self.curves, self.dotted = tables, curves, dotted
         self.depth = 0
 
     def read(self, node: ast.AST, *, condition: bool = False) -> SyntaxNode:
@@ -230,16 +249,18 @@ class _Reader:
         return self.syntax_node(node, "name", value=node.id)
 
     def read_Attribute(self, node: ast.Attribute) -> SyntaxNode:
-        """Convert a curve of a part, such as A.angle: a name with a dot."""
+        """Convert a name with dots: a curve of a part, such as A.angle; a sensor or a parameter of a group."""
         owner: ast.AST = node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
         named = isinstance(owner, ast.Name) and owner.id not in self.quantities
-        if not (named and self.curves):
-            text = ast.unparse(node)
+        text = ast.unparse(node)
+        if text in self.tables:
+            self.refuse(node, f"'{text}' is a table", f"give its argument: {text}(x)")
+        if not (named and (self.curves or text in self.dotted)):
             sensor = f"laws use curves by sensors: add fb.Sensor('name', '{text}') and write its name"
             self.refuse(node, f"'{text}' is not allowed in an expression", sensor if named else _ALLOWED)
-        return self.syntax_node(node, "name", value=ast.unparse(node))
+        return self.syntax_node(node, "name", value=text)
 
     def read_UnaryOp(self, node: ast.UnaryOp) -> SyntaxNode:
         if isinstance(node.op, ast.Not):

@@ -54,8 +54,12 @@ class Expression:
     where: str = field(default="", repr=False, compare=False)  # the law's owner, for messages
 
     @classmethod
-    def parse(cls, text: str, tables: Collection[str] = (), curves: bool = False) -> Expression:
+    def parse(
+        cls, text: str, tables: Collection[str] = (), curves: bool = False, names: Collection[str] = ()
+    ) -> Expression:
         """Parse an expression; ``tables`` are names that it may call like functions, ``curves``: names may have dots.
+
+        Those of ``names`` may have dots in any case.
 
         Raises
         ------
@@ -64,7 +68,8 @@ class Expression:
         """
         known: Mapping[str, Any] = tables if isinstance(tables, Mapping) else dict.fromkeys(tables)
         called = ((name, getattr(table, "arguments", ("x",))) for name, table in known.items())
-        return _parsed(text, frozenset(called), curves)
+        dotted = frozenset(k for k in names if "." in k) if "." in text and not curves else frozenset[str]()
+        return _parsed(text, frozenset(called), curves, dotted)
 
     @classmethod
     def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
@@ -156,9 +161,11 @@ class Expression:
 
 
 @lru_cache(maxsize=8192)
-def _parsed(text: str, tables: frozenset[tuple[str, tuple[str, ...]]], curves: bool) -> Expression:
+def _parsed(
+    text: str, tables: frozenset[tuple[str, tuple[str, ...]]], curves: bool, dotted: frozenset[str]
+) -> Expression:
     """Parse a text (cached: it is read when an element is added, and again for each analysis)."""
-    return Expression(*parse_text(text, dict(tables), curves))
+    return Expression(*parse_text(text, dict(tables), curves, dotted))
 
 
 def number(
@@ -218,7 +225,7 @@ def law_expression(
         if isinstance(value, Expression):
             return value
         if isinstance(value, str) and split_quantity(value) is None:
-            return Expression.parse(value, tables, curves)
+            return Expression.parse(value, tables, curves, names)
         if callable(value):
             return Expression.of_function(value, where)
     except ModelError as error:
@@ -294,7 +301,7 @@ def _evaluated(x: Expression, env: Mapping[str, Any]) -> Any:
 def _of_text(value: str, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
     parts = split_quantity(value)
     if parts is None:
-        expression = Expression.parse(value)
+        expression = Expression.parse(value, names=names)
         if expression.tree.kind == "name":
             check_dimension(expression.tree.value, env, dimension)
         return _evaluated(expression, env)
@@ -453,7 +460,7 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> ParameterValues:
     values: dict[str, Any] = {}
     for name, value in parameters.items():
         if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None):
-            formulas[name] = law_expression(value, None, f"parameter '{name}'")
+            formulas[name] = law_expression(value, None, f"parameter '{name}'", names=parameters)
         else:
             values[name] = number(value, {}, None, f"parameter '{name}'", parameters.keys())
     for name, formula in formulas.items():
@@ -469,7 +476,7 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> ParameterValues:
 def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
     """Return the parameters that depend on others, each after those that it uses."""
     formulas = {
-        name: law_expression(value, None, f"parameter '{name}'")
+        name: law_expression(value, None, f"parameter '{name}'", names=parameters)
         for name, value in parameters.items()
         if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None)
     }
@@ -515,7 +522,8 @@ def _in_order(formulas: Mapping[str, Expression]) -> list[str]:
 
 
 def _check_parameter_name(name: Any) -> None:
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+    words = name.split(".") if isinstance(name, str) else [""]
+    if not all(word.isidentifier() and not keyword.iskeyword(word) for word in words):
         reason = "is a word of the expression language" if keyword.iskeyword(name) else "is not a plain name"
         raise ExpressionError(f"parameter {name!r}: {reason}; use letters, digits and _, e.g. 'spring_rate'")
     kind = "a function" if name in FUNCTIONS else "a constant" if name in CONSTANTS else "time"

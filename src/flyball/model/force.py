@@ -159,6 +159,7 @@ class CoordinateForce(Force):
     }
     not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be negative
     sign: ClassVar[float] = 1.0  # sign of the output after value and rate, relative to the effort
+    odd: ClassVar[tuple[str, ...] | None] = None  # fields that change sign with its direction; None: it has one
     adds_inertia: ClassVar[bool] = False  # whether it adds inertia to the mass matrix along a joint's coordinate
 
     def ends(self) -> dict[str, str]:
@@ -179,6 +180,12 @@ class CoordinateForce(Force):
 
     def examine(self, model: Model) -> None:
         """Refuse coordinates along which it cannot act."""
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factors of its fields that change sign with its direction."""
+        if self.odd is None or len(set(signs)) > 1:
+            return super().reversed_factors(signs)
+        return dict.fromkeys(self.odd, signs[0])
 
     def added_inertia(self, n: SimpleNamespace) -> Any:
         """Return the inertia that it adds to the mass matrix along its coordinate [kg] or [kg m^2]."""
@@ -217,6 +224,10 @@ class WeightedSumForce:
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Return the weights as given; none for one coordinate."""
         return n.weights or ()
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return the factors of its weights, so that its sum remains the same."""
+        return {"weights": signs}
 
     def check_weights_given(self, n: SimpleNamespace) -> None:
         """Require weights for a sum, and none for one coordinate."""

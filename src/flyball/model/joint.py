@@ -110,6 +110,7 @@ class Joint(Element):
     one_sided: ClassVar[bool] = False  # whether its first row represents a contact that can only push
     both_sides: ClassVar[str] = ""  # the field that makes such a contact two-sided, for messages
     one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one surface
+    axial: ClassVar[bool] = False  # whether a reflection keeps rotations about its axes, not displacements along them
     thread: ClassVar[bool] = False  # whether its surface is a thread, along which all its coordinates slide together
 
     def ends(self) -> dict[str, str]:
@@ -175,6 +176,11 @@ class Joint(Element):
         """Return the value of a coordinate in the drawn configuration."""
         name = self.coordinates[coordinate].offset
         return getattr(n, name) if name else 0.0
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return factors of the values of its coordinates in the drawn configuration."""
+        own = self.coordinates.values()
+        return {c.offset: sign for c, sign in zip(own, signs, strict=True) if c.offset}
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
         """Return parameters 0 to 6 of a row for the drawn frames; the last is subtracted from its value.

@@ -18,6 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from ..docstrings import ArgumentHelp, argument_help, first_doc_line
 from ..errors import ModelError
+from .assembly_tables import ASSEMBLIES, DEFINITIONS, MAX_REPEATED, REPEAT, AssemblyTable
 from .element import Element, Flag, Number, Numbers, Unit, fields_with
 from .event import Action
 from .model import Model
@@ -29,6 +30,12 @@ from .snapshot import CATEGORIES
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 SETTINGS = {"name": str, "planar": Flag, "gravity": Numbers, "parameters": dict[str, Number]}
 """Types of the keys before the first table."""
+REPEAT_SCHEMA = {
+    "description": "Number of parts that this table stands for; in its texts {i}, {i+1}, ... are counted from 0.",
+    "type": "integer",
+    "minimum": 1,
+    "maximum": MAX_REPEATED,
+}
 _SENTENCE_END = re.compile(r"(?<=[.;])\s+(?=[A-Z])")
 
 
@@ -60,6 +67,14 @@ def model_schema(cls: type[Model]) -> dict[str, Any]:
     properties = {k: _type_schema(kind) | {"default": usual[k].default} for k, kind in SETTINGS.items()}
     _describe(properties, cls)
     properties |= {category: _category_schema(category) for category in CATEGORIES}
+    assemblies = _list_of(AssemblyTable, {"$ref": f"#/$defs/{AssemblyTable.__name__}"})
+    inner = {"type": "object", "properties": dict(properties) | {ASSEMBLIES: assemblies}, "additionalProperties": False}
+    properties[DEFINITIONS] = {
+        "description": "Mechanisms of which copies are added by [[assemblies]], by name.",
+        "type": "object",
+        "additionalProperties": inner,
+    }
+    properties[ASSEMBLIES] = assemblies
     return {
         "$schema": DIALECT,
         "title": "flyball model",
@@ -105,7 +120,7 @@ def _selected_by_type(names: list[str], default: str = "") -> dict[str, Any]:
 
 def _definitions() -> dict[str, Any]:
     """Return the schemas of all elements, shapes and actions by name."""
-    found = {cls.__name__: _table_schema(cls) for cls in ONE_KIND.values()}
+    found = {cls.__name__: _table_schema(cls) for cls in (*ONE_KIND.values(), AssemblyTable)}
     for category in (*MANY_KINDS, *DEFAULT_KINDS):
         found |= {name: _table_schema(Element.registry[name], typed=True) for name in element_types(category)}
     shapes = {c.__name__: c for c in (*SHAPES, *SURFACES)}
@@ -133,6 +148,8 @@ def _table_schema(cls: type, typed: bool = False) -> dict[str, Any]:
     schema = _type_schema(cls)
     _describe(schema["properties"], cls)
     kind = {"type": {"description": first_doc_line(cls), "type": "string", "const": cls.__name__}}
+    if not issubclass(cls, (Solid, Action)):
+        schema["properties"] |= {REPEAT: REPEAT_SCHEMA}
     return {
         "description": first_doc_line(cls),
         "type": "object",

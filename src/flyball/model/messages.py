@@ -97,30 +97,41 @@ def summary_lines(model: Model) -> list[tuple[str, str]]:
     gravity = ", ".join(str(x) for x in model.gravity)
     head = ("planar" if model.planar else "spatial") + (f", gravity ({gravity})" if model.gravity_told else "")
     out = [("mechanism", f"{model.name!r}, {head}")]
-    out += _line("ground", (e.name for e in model.ground))
-    out += _line("bodies", (e.name for e in model.bodies))
+    for category in ("ground", "bodies"):
+        out += _line(category, _folded(e.name for e in getattr(model, category)), len(getattr(model, category)), ", ")
     out += _line("bulk", (f"{e.count} {e.name}" for e in model.bulk))
-    out += _line("frames", (e.name for e in model.frames))
+    out += _line("frames", _folded(e.name for e in model.frames), len(model.frames), ", ")
     for category in ("joints", "couplings", "controllers", "forces"):
         kinds: dict[str, list[str]] = {}
         for e in getattr(model, category):
             kinds.setdefault(type(e).__name__, []).append(e.name)
         out += _line(
             category,
-            (f"{kind} {shortened_list(names)}" for kind, names in kinds.items()),
+            (f"{kind} {shortened_list(_folded(names))}" for kind, names in kinds.items()),
             len(getattr(model, category)),
         )
     out += _line("drivers", (f"{d.name} ({d.coordinate} = {d.law})" for d in model.drivers))
     for category in ("sensors", "tables", "initial", "materials", "contacts", "limits"):
-        out += _line(category, (e.name for e in getattr(model, category)))
+        names = _folded((e.name for e in getattr(model, category)), 2 if category == "initial" else 1)
+        out += _line(category, names, len(getattr(model, category)), ", ")
     out += _line("events", (f"{e.name} ({e.when})" for e in model.events))
-    return out + _line("parameters", (f"{k} = {v}" for k, v in model.parameters.items()))
+    own = [f"{k} = {v}" for k, v in model.parameters.items() if "." not in k]
+    own += _folded(k for k in model.parameters if "." in k)
+    return out + _line("parameters", own, len(model.parameters), ", ")
 
 
-def _line(label: str, texts: Iterable[str], count: int | None = None) -> list[tuple[str, str]]:
+def _folded(names: Iterable[str], depth: int = 1) -> list[str]:
+    """Return names with several of one group as one, ``left.* (4)``; the last ``depth`` words are no groups."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(name.partition(".")[0] + ".*" if name.count(".") >= depth else name, []).append(name)
+    return [inner[0] if len(inner) == 1 else f"{group} ({len(inner)})" for group, inner in groups.items()]
+
+
+def _line(label: str, texts: Iterable[str], count: int | None = None, between: str = "; ") -> list[tuple[str, str]]:
     """Return one line, shortened if it is long; empty if there is nothing."""
     every = list(texts)
-    text = "; ".join(every) if count is not None else shortened_list(every, LINE_WIDTH)
+    text = "; ".join(every) if count is not None and between == "; " else shortened_list(every, LINE_WIDTH)
     return [(label, f"{len(every) if count is None else count}: {text}")] if every else []
 
 

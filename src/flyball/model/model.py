@@ -23,6 +23,7 @@ from .joint import Coupling, Joint
 from .messages import listing as listing
 from .messages import suggest as suggest
 from .messages import summary
+from .names import curve_parts, groups_of
 from .quantities import actual_kind, carrier_names, check_units, measured_quantity
 from .snapshot import (
     CATEGORIES,
@@ -34,6 +35,7 @@ from .snapshot import (
     same_values,
     snapshot,
 )
+from .subassembly import add_subassembly
 from .table import Table
 from .table_2d import Table2D
 from .units import same_kind
@@ -88,6 +90,7 @@ class Model:
         self.limits: list[Unilateral] = []
         self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
+        self.groups: set[str] = {g for name in self.parameters for g in groups_of(name)}
         self.gravity_vector()
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> ParameterValues:
@@ -204,23 +207,66 @@ class Model:
 
     def __getitem__(self, name: str) -> Any:
         """Return the part with that name."""
+        if name in self.groups:
+            inner = [x.removeprefix(f"{name}.") for x in self.by_name if x.startswith(f"{name}.")]
+            raise ModelError(
+                f"{self.name!r}: {name!r} is a group of parts; name one: {name}.{inner[0]}, ...; {listing(inner)}"
+            )
         if name not in self.by_name:
             known = self.names()
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
         return self.by_name[name]
 
-    def add(self, *elements: Element) -> Any:
-        """Add parts and check them against the existing ones. Return the (last) part added.
+    def add(
+        self,
+        *elements: Element | Model,
+        prefix: str | None = None,
+        at: Any = None,
+        orientation: Any = None,
+        angle: Any = None,
+        mirror: str | None = None,
+        on: str = GROUND,
+        parameters: Mapping[str, Any] | None = None,
+    ) -> Any:
+        """Add parts and check them against the existing ones, or a copy of another mechanism. Return the (last) part.
+
+        ``m.add(corner, prefix="left", at=(0, 0.7, 0))`` adds all parts of the mechanism ``corner``: its body ``arm`` is
+        ``left.arm``. They are ordinary parts; a later change of ``corner`` has no effect.
+
+        Parameters
+        ----------
+        elements : parts, or one mechanism
+        prefix : str
+            Of the names of all its parts and parameters: plain words, with dots between for groups in groups.
+        at : point [m]
+            Where the origin of its world comes to be; numbers, quantities or expressions of parameters.
+        orientation : quaternion, Bryant angles [rad], rotation object or matrix
+            In space: axes of its world. They do not depend on parameters.
+        angle : number [rad]
+            In the plane.
+        mirror : {"x", "y", "z"}
+            The coordinate of its world that changes its sign before that. Laws and values of coordinates are adapted.
+        on : str
+            The body to which it is attached with all that stands on ground in it.
+        parameters : dict
+            Values of its parameters in the copy, or expressions of this mechanism's; its own where not given.
 
         Raises
         ------
         ModelError
-            If a name is taken, a body or joint it refers to is unknown, or a number is invalid.
+            If a name is taken, a body or joint it refers to is unknown, or a number is invalid; if a part of the
+            mechanism cannot be turned or reflected. Nothing of it is then added.
         """
         refuse_changes(self, "nothing can be added")
+        placed = (prefix, at, orientation, angle, mirror, on, parameters)
+        given = any(x is not None for x in placed if x is not on) or on != GROUND
+        if given or any(isinstance(e, Model) for e in elements):
+            if len(elements) != 1 or not isinstance(elements[0], Model):
+                raise ModelError("prefix=, at=, mirror= and the like are for one mechanism: m.add(part, prefix='left')")
+            return add_subassembly(self, elements[0], *placed)
         vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
         try:
-            return self._add(*elements)
+            return self._add(*elements)  # type: ignore[arg-type]
         finally:
             vars(self).pop("_adding")
 
@@ -239,6 +285,7 @@ class Model:
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
                 self.by_name[e.name] = e
+                self.groups.update(groups_of(e.name))
             last = e
         return last
 
@@ -309,7 +356,7 @@ class Model:
 
     def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
         """Return (joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
-        owner, _, what = text.partition(".")
+        owner, what = curve_parts(text, self.by_name)
         found = self.by_name.get(owner)
         if isinstance(found, (Body, Frame)):
             axes = found.measured(self.planar)

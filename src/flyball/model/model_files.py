@@ -6,6 +6,7 @@ table, type or field is refused with the line, the nearest known names and the r
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import os
 import re
@@ -13,10 +14,12 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from contextlib import redirect_stdout
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from ..errors import FlyballError, ModelError
+from .assembly_tables import ASSEMBLIES, DEFINITIONS, AssemblyTable, repeated
 from .body import Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, Material, MaterialPair
 from .contact_point import Touch
@@ -26,10 +29,10 @@ from .event import Event
 from .expression_parser import function_name
 from .force import Force, Unilateral
 from .joint import Coupling, Joint
-from .messages import suggest_part
+from .messages import listing, suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
-from .shapes.mesh import Mesh, paths_from
+from .shapes.mesh import Mesh, current_folder, paths_from
 from .snapshot import CATEGORIES
 from .table import Table
 from .table_2d import Table2D
@@ -51,6 +54,8 @@ ONE_KIND = {
     "events": Event,
 }
 MUTUAL = "controllers"  # categories whose elements may refer to each other
+ORDER = tuple(x for c in CATEGORIES for x in ((c, ASSEMBLIES) if c == "bulk" else (c,)))
+"""Tables in the order in which their parts are added."""
 AFTER_OTHERS = ("couplings", "sensors", "controllers", "forces", "drivers")  # these may refer to their own kind
 SELF_NAMED = ("material_pairs", "contacts")  # categories with automatic names
 MANY_KINDS = {
@@ -65,6 +70,8 @@ FEW_KINDS: dict[str, dict[str, type[Element]]] = {
     "sensors": {"Sensor": Sensor, "IMU": IMU},
     "tables": {"Table": Table, "Table2D": Table2D},
 }
+_OPEN: ContextVar[tuple[Path, ...]] = ContextVar("open", default=())  # files that are being read
+_SOURCE = ("file", "of")  # fields of the tables of assemblies that name the mechanism
 WIDTH = 100  # longer lists of shapes are written with one shape per line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
@@ -166,6 +173,7 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
     """
     path = Path(path)
     text = read_text(path)
+    token = _OPEN.set((*_OPEN.get(), path.resolve()))
     with paths_from(path.parent):
         try:
             return loads(text, cls, os.fspath(path))
@@ -173,6 +181,8 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
             if path.suffix.lower() == ".toml":
                 raise
             raise ModelError(f"{path} is no model file, these end in .toml, .py, .urdf or .xml: {error}") from None
+        finally:
+            _OPEN.reset(token)
 
 
 def read_text(path: Path) -> str:
@@ -196,14 +206,23 @@ def read_text(path: Path) -> str:
 
 def loads(text: str, cls: type[M], source: str = "model") -> M:
     """Read a mechanism of class ``cls`` from the text of a TOML file; ``source`` names it in messages."""
-    data = parsed(text, source)
-    known = [*SETTINGS, *CATEGORIES]
+    return described(parsed(text, source), text, cls, source, {})
+
+
+def described(data: Mapping[str, Any], text: str, cls: type[M], source: str, definitions: Mapping[str, Any]) -> M:
+    """Return the mechanism of the data of a file with that text, or of a definition in it."""
+    known = [*SETTINGS, DEFINITIONS, *ORDER]
     for key, value in data.items():
         if key not in known:
             what = "table" if isinstance(value, (Mapping, list)) else "key"
             raise ModelError(f"{source}: unknown {what} {key!r}{suggest(key, known)}; a model has {', '.join(known)}")
     model = _settings(data, cls, source)
-    _add_all(model, _entries(data, text, source))
+    found = data.get(DEFINITIONS, {})
+    if not isinstance(found, Mapping) or not all(isinstance(x, Mapping) for x in found.values()):
+        raise ModelError(
+            f"{source}: {DEFINITIONS!r} must be tables of mechanisms, such as [[definitions.corner.bodies]]"
+        )
+    _add_all(model, _entries(data, text, source), {**definitions, **found}, source)
     return model
 
 
@@ -213,20 +232,25 @@ Entry = tuple[str, Mapping[str, Any], str]
 def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
     """Return (category, fields, location in the file) of every element."""
     lines = _header_lines(text)
-    out = []
-    for category in CATEGORIES:
+    out: list[Entry] = []
+    for category in ORDER:
         tables = data.get(category, [])
         if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
             raise ModelError(f"{source}: {category!r} must be tables, each headed [[{category}]]")
         places = lines.get(category, [])
         for k, table in enumerate(tables):
             line = f" (line {places[k]})" if len(places) == len(tables) else ""
-            name = f" {table['name']!r}" if isinstance(table.get("name"), str) else ""
-            out.append((category, table, f"{source}: [[{category}]] {k + 1}{name}{line}"))
+            named = "prefix" if category == ASSEMBLIES else "name"
+            name = f" {table[named]!r}" if isinstance(table.get(named), str) else ""
+            where = f"{source}: [[{category}]] {k + 1}{name}{line}"
+            try:
+                out.extend((category, one, where) for one in repeated(table, named))
+            except ModelError as error:
+                _refuse(error, where)
     return out
 
 
-def _add_all(model: Model, entries: list[Entry]) -> None:
+def _add_all(model: Model, entries: list[Entry], definitions: Mapping[str, Any], source: str) -> None:
     """Add every element; elements that refer to others further down in the file are added after them."""
     waiting = entries
     while waiting:
@@ -234,7 +258,7 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
         errors: list[ModelError] = []
         for entry in waiting:
             try:
-                _add(model, *entry)
+                _add(model, *entry, definitions, source)
             except ModelError as error:
                 failed.append(entry)
                 errors.append(error)
@@ -247,7 +271,7 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
     for category in AFTER_OTHERS:
-        getattr(model, category).sort(key=lambda e: place[e.name])
+        getattr(model, category).sort(key=lambda e: place.get(e.name, -1))
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:
@@ -325,12 +349,45 @@ def _header_lines(text: str) -> dict[str, list[int]]:
     return out
 
 
-def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
+def _add(
+    model: Model, category: str, table: Mapping[str, Any], where: str, definitions: Mapping[str, Any], source: str
+) -> None:
+    try:
+        if category == ASSEMBLIES:
+            fields = AssemblyTable(**table)
+            part = _subassembly(fields, model, definitions, source)
+            model.add(
+                part, **{f.name: getattr(fields, f.name) for f in dataclasses.fields(fields) if f.name not in _SOURCE}
+            )
+            return
+    except Exception as error:
+        _refuse(error, where)
     made = _make_element(category, table, where)
     try:
         model.add(made)
     except Exception as error:
         _refuse(error, where)
+
+
+def _subassembly(table: AssemblyTable, model: M, definitions: Mapping[str, Any], source: str) -> M:
+    """Return the mechanism of which a table adds a copy."""
+    if (table.file is None) == (table.of is None):
+        raise ModelError("give file=, or of= the name of one of the definitions; one of them")
+    if table.of is not None:
+        if table.of not in definitions:
+            known = list(definitions)
+            raise ModelError(f"there is no definition {table.of!r}{suggest(table.of, known)}; {listing(known)}")
+        data = {"name": table.of, "planar": model.planar} | dict(definitions[table.of])
+        inner = {k: x for k, x in definitions.items() if k != table.of}
+        return described(data, "", type(model), f"{source}: definition {table.of!r}", inner)
+    path = (current_folder() / str(table.file)).resolve()
+    if path.suffix.lower() != ".toml":
+        raise ModelError(
+            f"file {table.file!r} is no model file in TOML; other mechanisms are added in Python: m.add(part)"
+        )
+    if path in _OPEN.get():
+        raise ModelError(f"file {table.file!r} contains itself: {' -> '.join(p.name for p in (*_OPEN.get(), path))}")
+    return load(path, type(model))
 
 
 def _make_element(category: str, table: Mapping[str, Any], where: str) -> Element:

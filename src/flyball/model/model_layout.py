@@ -13,8 +13,9 @@ import tomllib
 from dataclasses import dataclass, field
 
 from ..errors import ModelError
+from .assembly_tables import DEFINITIONS
+from .model_files import ORDER as TABLES
 from .model_files import PARAMETERS, SETTINGS, WIDTH, parsed
-from .snapshot import CATEGORIES
 
 TOKENS = re.compile(
     r'"""(?:\\.|[^\\])*?"{3,5}'  # a string over several lines; its last characters may be quotation marks, too
@@ -27,7 +28,7 @@ TOKENS = re.compile(
     re.DOTALL,
 )
 OPENING, CLOSING = ("[", "{"), ("]", "}")
-ORDER = ("", PARAMETERS, *CATEGORIES)
+ORDER = ("", PARAMETERS, DEFINITIONS, *TABLES)
 """The order of the tables; the first are the settings, before all headers."""
 FIRST = ("type", "name")
 """The first fields of a table."""

@@ -22,6 +22,7 @@ from .expressions import law_expression, number
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
 from .joint import ORIENTATION_ANGLES, Coupling, Joint
 from .messages import listing, suggest
+from .names import curve_parts, is_curve
 from .units import split_quantity
 
 if TYPE_CHECKING:
@@ -128,12 +129,12 @@ def single_quantity(model: Model, name: str) -> Quantity:
     ModelError
         If there is none of that name, or it has several components; the message names similar ones.
     """
-    owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
+    owner, what = curve_parts(name, model) if isinstance(name, str) else ("", "")
     if not owner:
         raise ModelError(f"a quantity is named by a text, such as 'slider.x' or the name of a sensor, not {name!r}")
     table = quantities(model, owner)
-    x = table.get(what if dot else "value")
-    if x is None and not dot:
+    x = table.get(what or "value")
+    if x is None and not what:
         listed = ", ".join(f"{owner}.{k}" for k, q in table.items() if not q.width)
         raise ModelError(f"{name!r} is a whole part ({model[owner].title}); name one of {listed or 'another part'}")
     if x is None:
@@ -149,7 +150,7 @@ def _effort(unit: str) -> str:
 
 
 def _unit_of(model: Model, text: str) -> str:
-    owner, _, what = text.partition(".")
+    owner, what = curve_parts(text, model)
     return quantities(model, owner)[what].unit
 
 
@@ -202,7 +203,7 @@ def _of_frame(axes: str) -> Table:
 def _of_locks(model: Model, body: Body) -> Table:
     """Return the lock efforts of a body with coordinates that events lock, one for each."""
     locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
-    own = dict.fromkeys(what for owner, _, what in (x.rpartition(".") for x in locked) if owner == body.name)
+    own = dict.fromkeys(what for owner, what in map(curve_parts, locked) if owner == body.name)
     units = {what: _effort(body.coordinates[what].unit) for what in own}
     return {f"{what}_effort": Quantity(unit, curve=True, array=True) for what, unit in units.items()}
 
@@ -298,7 +299,7 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
 
     ``"A.force"`` is the magnitude of a joint's force; in space ``"A.torque"`` that of its torque.
     """
-    owner, _, what = name.partition(".")
+    owner, what = curve_parts(name, model)
     e = model.find(owner)
     if isinstance(e, Joint):
         if model.planar and what in ("fx", "fy", "force", "torque"):
@@ -319,7 +320,7 @@ class Curve(NamedTuple):
 
 def measured_quantity(model: Model, e: Sensor | Curve) -> tuple[str, str, int] | None:
     """Return what a sensor measures; see `Model.measured`."""
-    owner, _, what = e.of.partition(".")
+    owner, what = curve_parts(e.of, model)
     found = model.find(owner)
     if found is None and owner != ENERGY:
         known = model.names()
@@ -394,7 +395,7 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
                 tables = {x.name: x for x in model.tables}
                 names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
                 where = f"{name} of {e.title}"
-                law = law_expression(value, pair[turning], where, tables, names, any("." in k for k in names))
+                law = law_expression(value, pair[turning], where, tables, names, any(is_curve(model, k) for k in names))
                 if name in e.not_negative and law.names <= set(env) and not law.tables and law.function is None:
                     given = law.evaluate(env)
                     if not given.real >= 0.0:
@@ -409,7 +410,7 @@ def _check_set_point(model: Model, e: Controller) -> None:
     """Refuse a set point of another kind than the measured curve; expressions have no known unit."""
     given = {k: x for k in e.compared if isinstance(x := getattr(e, k), str)}
     for (name, told), (_, curve) in permutations(given.items(), 2):
-        owner, _, what = curve.partition(".")
+        owner, what = curve_parts(curve, model)
         table = quantities(model, owner) if model.find(owner) is not None else {}
         if what in table and table[what].unit and split_quantity(told) is not None:
             number(told, {}, table[what].unit, f"{name} of {e.title}")

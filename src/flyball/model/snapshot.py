@@ -106,7 +106,10 @@ def model_copy(model: Model) -> Any:
     vars(out).pop("cache", None)
     vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
     vars(out)["gravity"] = copy(model.gravity)  # it may be a list
-    vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
+    vars(out).update(
+        {name: list(getattr(model, name)) for name in CATEGORIES}
+        | {"by_name": dict(model.by_name), "groups": set(model.groups)}
+    )
     return out
 
 

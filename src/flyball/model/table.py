@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 from functools import cached_property
 from types import SimpleNamespace
@@ -15,6 +14,7 @@ from ..errors import ModelError, UnitError
 from ..math.spline import BREAKS, PIECE, pack_spline, spline, spline_expression
 from .element import Element, checked_size, element, python_data
 from .expression_parser import CONSTANTS, FUNCTIONS
+from .names import is_plain
 from .units import to_si
 
 Column = Annotated[tuple[float, ...], BeforeValidator(python_data)]
@@ -171,7 +171,7 @@ def check_table_name(e: Element) -> None:
     ModelError
         Naming the table.
     """
-    if not e.name.isidentifier() or keyword.iskeyword(e.name):
+    if not is_plain(e.name):
         raise ModelError(f"{e.title}: expressions call a table by its name; use letters, digits and _ only")
     if e.name in FUNCTIONS or e.name in CONSTANTS or e.name == "t":
         raise ModelError(f"{e.title}: the name has a meaning in expressions; call it '{e.name}_curve'")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import keyword
 import math
 import unicodedata
 from collections.abc import Iterable, Mapping
@@ -24,6 +23,7 @@ from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointFor
 from .geometry import vector
 from .inertia import checked_shapes, mass_properties
 from .joint import Coupling, Joint
+from .names import groups_of, is_curve, is_plain
 from .quantities import Curve, measured_quantity, transmitted_force
 from .table import Table
 from .table_2d import Table2D, separate_tables
@@ -46,14 +46,20 @@ def check_name(model: Model, e: Element) -> None:
         if any(i.name == e.name for i in model.initial):
             raise ModelError(f"{e.title}: there is an initial condition for {e.name!r} already")
         return
-    if not e.name or "." in e.name or e.name != e.name.strip():
-        raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
-    if e.name in RESERVED:
-        raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
+    if not all(word and word == word.strip() for word in e.name.split(".")):
+        raise ModelError(
+            f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty; what precedes a '.' is a group, "
+            f"as in 'left.arm'"
+        )
+    for name in (*groups_of(e.name), e.name):
+        if name in RESERVED:
+            raise ModelError(f"{e.title}: the name {name!r} is reserved")
     if isinstance(e, (Sensor, Controller)):
         _check_read(e)
     if isinstance(e, (Sensor, Table, Table2D, Controller)) and e.name in model.parameters:
         raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
+    for name in [g for g in groups_of(e.name) if g in model.by_name] + [e.name] * (e.name in model.groups):
+        raise ModelError(f"{e.title}: {name!r} would be the name of a part and of a group of parts; rename one of them")
     if e.name in model.by_name:
         raise ModelError(f"{e.title}: the name is taken by {model.by_name[e.name].title}; names must be unique")
 
@@ -66,7 +72,7 @@ def _check_read(e: Element) -> None:
         raise ModelError(f"{e.title}: laws read {e.name!r} as {what}; rename it, {other!r} for instance")
     if not isinstance(e, Controller):
         return
-    if not e.name.isidentifier() or keyword.iskeyword(e.name):
+    if not is_plain(e.name):
         raise ModelError(f"{e.title}: laws name a controller by its name; use letters, digits and _, no digit first")
     read = unicodedata.normalize("NFKC", e.name)
     if read != e.name:
@@ -273,7 +279,7 @@ def checked_law(
     try:
         signals = controller_signals.signal_names(model)
         expression = law_expression(value, of.dimension, where, tables, names, of.curves or bool(signals))
-        if not of.curves and any("." in k and k not in signals for k in expression.names - set(names)):
+        if not of.curves and any(is_curve(model, k) and k not in signals for k in expression.names - set(names)):
             controller_signals.refuse_unknown(model, expression)
             law_expression(value, of.dimension, where, tables, names)  # parsing refuses curves of other parts
         tree = separate_tables(expression.tree, tables) if expression.tables else expression.tree
@@ -285,11 +291,11 @@ def checked_law(
         sensors = {k: x for k in expression.names if isinstance(x := model.find(k), Sensor)}
         if signals:
             controller_signals.refuse_unknown(model, expression)
-        curves = {k for k in expression.names if "." in k and k not in signals} if of.curves else set()
+        curves = {k for k in expression.names if is_curve(model, k) and k not in signals} if of.curves else set()
         expression.require({*names, *curves})
         fold_constants(expression.tree, expression.text)
         refuse_ambiguous_names(
-            expression.names, of.inputs, {*sensors, *(k for k in signals if "." not in k)}, model.parameters
+            expression.names, of.inputs, {*sensors, *(k for k in signals if not is_curve(model, k))}, model.parameters
         )
     except ExpressionError as error:
         text = str(error)

@@ -27,6 +27,7 @@ from ..engine.loads import force_row
 from ..math.vec import mm, transpose
 from ..model.body import GROUND
 from ..model.joint import Joint
+from ..model.names import curve_parts
 from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 from ..numerics.integrators.radau_stages import RADAU_A as RADAU
 from ..tables.law_inputs import forces_in_events
@@ -479,7 +480,7 @@ def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str
     """
     found = []
     for name, x in forces_in_events(model).items() if undetermined else ():
-        kind = "force" if name.partition(".")[2].startswith("f") else "torque"
+        kind = "force" if curve_parts(name)[1].startswith("f") else "torque"
         found.append((name, tuple(k for k in undetermined.get(x.element.name, ()) if k.startswith(kind))))
     return [(name, what) for name, what in found if what]
 

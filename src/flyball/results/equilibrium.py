@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.names import curve_parts
 from ..model.output_files import PAGE, write_file
 from .wording import UNSTABLE, number_text
 
@@ -268,7 +269,7 @@ class EquilibriumSeries:
         """Up to three of the most important curves: coordinates of the degrees of freedom, else of the first body."""
         known = self.equilibria[0].result.channels() if self.equilibria else {}
         names = [f for f in self.equilibria[0].freedoms if f in known] if self.equilibria else []
-        return (names or [n for n in known if n.partition(".")[2] in ("x", "y", "z", "angle")])[:3]
+        return (names or [n for n in known if curve_parts(n)[1] in ("x", "y", "z", "angle")])[:3]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names, all curves included."""

@@ -366,7 +366,9 @@ class Moment:
         ModelError
             If there is no such curve, or it jumps there.
         """
-        value = np.asarray(self.single_time_result.channel(name if "." in name else f"{name}.value")[1])[0]
+        value = np.asarray(
+            self.single_time_result.channel(f"{name}.value" if name in self.single_time_result.model else name)[1]
+        )[0]
         if not np.isfinite(value).all():
             raise ModelError(
                 f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.output_files import PAGE, RESULT, SCENE, TABLE, VIDEO, file_extension, write_file
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
@@ -35,6 +36,7 @@ from .motion_record import MeasuredQuantities, MotionRecord, RecordedMotion, rec
 from .part_views import has_view, view_of
 from .part_views.base import SplicedView
 from .part_views.bodies import SET_MOTION_ARRAYS, BodySetMotion, BodySetView, SetMemberView
+from .part_views.groups import GroupView
 from .reactions import EventImpulses, JointReactions
 from .wording import range_text
 
@@ -236,7 +238,7 @@ class Result:
         return JointReactions(self)
 
     def __getitem__(self, name: str) -> Any:
-        """Return a part by its name, or one of its quantities by ``"part.quantity"``.
+        """Return a part by its name, a group of parts, or a quantity of a part by ``"part.quantity"``.
 
         Raises
         ------
@@ -247,14 +249,17 @@ class Result:
             raise ModelError(
                 f"a result is read by name, for instance result['crank'] or result['crank.x'], not {name!r}"
             )
-        return self.channel(name)[1] if "." in name else self._view(name)
+        whole = name in self.model.groups or not curve_parts(name, self.model)[1]
+        return self._view(name) if whole else self.channel(name)[1]
 
     def __contains__(self, name: object) -> bool:
         """Return whether there is a part, or a quantity, of that name."""
-        owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
+        owner, what = curve_parts(name, self.model) if isinstance(name, str) else ("", "")
+        if name in self.model.groups:
+            return True
         if owner not in self.parts() and self.set_of_bodies(owner) is None:
             return False
-        return not dot or what in self._view(owner).names
+        return not what or what in self._view(owner).names
 
     def _view(self, name: str) -> Any:
         views = self.__dict__.setdefault("_views", {})
@@ -265,6 +270,8 @@ class Result:
     def _viewed(self, name: str) -> Any:
         if name == ENERGY:
             return self.energy
+        if name in self.model.groups:
+            return GroupView(self, name)
         if (found := self.set_of_bodies(name)) is None:
             if self.pieces:
                 return SplicedView([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
@@ -310,7 +317,7 @@ class Result:
         ModelError
             If there is no such part or quantity; the message lists the existing ones.
         """
-        owner, _, what = name.partition(".")
+        owner, what = curve_parts(name, self.model)
         return self._view(owner).quantity(what)
 
     def curve(self, name: str) -> tuple[str, np.ndarray]:
@@ -322,7 +329,7 @@ class Result:
             If there is none of that name, or it has several components.
         """
         single_quantity(self.model, name)
-        return self.channel(name if "." in name else f"{name}.value")
+        return self.channel(f"{name}.value" if name in self.model else name)
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""

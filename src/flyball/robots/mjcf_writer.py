@@ -35,6 +35,7 @@ from ..model.geometry import matrix_to_quaternion
 from ..model.inertia import checked_shapes, mass_properties
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.output_files import write_file
 from ..model.shapes.box import Box
 from ..model.shapes.capsule import Capsule
@@ -211,7 +212,7 @@ class _Writer:
                  POINT: [("slide", k) for k in range(int(S.tree.nv[b]))]}.get(int(kind), [])  # fmt: skip
         for k, (what, axis) in enumerate(steps):
             name = velocity_names(self.s)[int(S.tree.v[b]) + k].name
-            owner = name.partition(".")[0]
+            owner = curve_parts(name)[0]
             alone = what == "ball" or sum(x.name.startswith(f"{owner}.") for x in velocity_names(self.s)) == 1
             given = {
                 "name": owner if alone else self.names.new(name.replace(".", "_")),
@@ -283,7 +284,7 @@ class _Writer:
 
     def _row_of(self, text: str) -> int | None:
         """Row of the joint that has a coordinate, written ``joint.coordinate``."""
-        joint, _, what = text.partition(".")
+        joint, what = curve_parts(text)
         row = coordinate_row(self.s, joint, what)
         return row if row in self.joint_tags else None
 
@@ -404,7 +405,7 @@ def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
 
     texts = [text for c in model.couplings for text in c.coupled()]
     texts += [text for e in (*model.forces, *model.limits) if isinstance(e, CoordinateForce) for text in e.along()]
-    used = {text.partition(".")[0] for text in texts}
+    used = {curve_parts(text)[0] for text in texts}
     tree, cut = set(), []
     for j in sorted(model.joints, key=lambda x: isinstance(x, CLOSED_BY_EQUALITIES) * (1 + (x.name not in used))):
         a, b = (root(x) for x in joint_bodies(model, j))

@@ -25,6 +25,7 @@ from ..model.element import Element
 from ..model.inertia import checked_shapes, mass_properties
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.output_files import write_file
 from ..model.shapes.box import Box
 from ..model.shapes.cylinder import Cylinder
@@ -204,7 +205,7 @@ class _Writer:
 
     def _drawn(self, along: str) -> float | None:
         """Value of a coordinate in the reference configuration; None unless a joint of URDF has this coordinate."""
-        joint, _, what = along.partition(".")
+        joint, what = curve_parts(along)
         kind = TYPES.get(type(self.model.find(joint)))  # type: ignore[arg-type]
         return float(getattr(self.numbers[joint], what)) if what and COORDINATES.get(kind or "") == what else None
 
@@ -230,7 +231,7 @@ class _Writer:
             follower, other, multiplier, offset = (first, second, -f, c0)
             if first in reached:
                 follower, other, multiplier, offset = (second, first, -1.0 / f, c0 / f)
-            found[follower] = c.name, other.partition(".")[0], float(multiplier), float(offset)
+            found[follower] = c.name, curve_parts(other)[0], float(multiplier), float(offset)
             reached |= {first, second}
         return found
 
@@ -276,7 +277,7 @@ class _Writer:
             control, along = control_of(self.model, e), getattr(e, "coordinate_text", str)()
             if control is None or self._drawn(along) is None or control[0] == 0.0:
                 continue
-            joint = along.partition(".")[0]
+            joint = curve_parts(along)[0]
             if joint in driven:
                 self.reasons[e.name] = "URDF has one simple transmission a joint"
                 continue

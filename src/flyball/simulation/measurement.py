@@ -337,7 +337,7 @@ def _with_sensors(model: Model, outputs: Sequence[str]) -> tuple[Model, list[str
     out, names = model.copy(), []
     for k, name in enumerate(outputs):
         single_quantity(model, name)  # refuses unknown names
-        sensor = out.find(name) if "." not in name else None
+        sensor = out.find(name)
         if not isinstance(sensor, Sensor):
             sensor = Sensor(f"output_{k}_of_{''.join(c if c.isalnum() else '_' for c in name)}", of=name)
             out.add(sensor)

@@ -16,6 +16,7 @@ from ..analysis_options import require_count as at_least
 from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.unsupported_elements import refuse_unsupported
 from ..numerics.rank import null_space
 from ..results.singularities import Branch, Singularities
@@ -262,8 +263,8 @@ def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
     held = extra @ null_space(extra[-1:], 0.0)  # freedoms that do not move the driver
     moving = np.max([np.abs(f.rates(x, d)) for d in held.T], axis=0)
     free_labels = [f.labels[k] for k in np.flatnonzero(moving > 1e-6 * moving.max())]
-    joints = [k for k in free_labels if k.partition(".")[0] in {j.name for j in f.model.joints}]
-    bodies = list(dict.fromkeys(k.partition(".")[0] for k in free_labels if k not in joints))
+    joints = [k for k in free_labels if curve_parts(k)[0] in {j.name for j in f.model.joints}]
+    bodies = list(dict.fromkeys(curve_parts(k)[0] for k in free_labels if k not in joints))
     count = held.shape[1]
     raise MobilityError(
         f"{f.model.name!r} has {count} freedom{'s' if count > 1 else ''} left besides driver {f.driver.name!r}: with "

@@ -20,6 +20,7 @@ from ..derivatives.output_derivatives import snapshot
 from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.contact import not_for_impulse_stepping
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, FRICTIONLESS, STICKS, Equilibrium, Touch
 from ..results.wording import MARGINAL, NOT_JUDGED
 from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
@@ -196,7 +197,7 @@ class _Settling:
             for own, x in zip(
                 velocity_names(c.structure), self._mechanism_velocities() * c.values.length / c.sizes, strict=True
             ):
-                name = own.name.partition(".")[0]
+                name = curve_parts(own.name)[0]
                 out[name] = max(out.get(name, 0.0), abs(float(x)))
         return out
 

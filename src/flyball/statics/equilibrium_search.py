@@ -35,6 +35,7 @@ from ..engine.kinematics import retract
 from ..errors import ModelError, NotConverged, SingularityError
 from ..model.joint import Joint
 from ..model.messages import listing, suggest
+from ..model.names import curve_parts
 from ..numerics.rank import clearly_independent
 from ..results.equilibrium import Equilibrium
 from ..simulation.initial_state import choose_coordinates
@@ -399,7 +400,7 @@ def _velocity_of_coordinate(b: Assembly, name: str) -> int:
     floating = {n.name: d for d, n in enumerate(velocity_names(s)) if n.unit == "m"}
     if name in floating:  # coordinate of a free body, such as a rolling vehicle
         return floating[name]
-    owner, _, what = name.partition(".")
+    owner, what = curve_parts(name)
     element = s.model.find(owner)
     if not isinstance(element, Joint) or what not in element.coordinates:
         known = [f"{j.name}.{c}" for j in s.model.joints for c in j.measured(s.model.planar)]

@@ -21,6 +21,7 @@ from ..errors import AnalysisError, ModelError
 from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision, expanded_symbol_count, object_vector
 from ..model.expressions import is_number_text
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..model.output_files import LATEX, PAGE, write_file
 from ..model.quantities import ENERGY
 from ..results.result import Result
@@ -279,9 +280,8 @@ class Quantities:
 
     def quantity(self, name: str) -> Expressions:
         """A quantity of a part, by its name in results."""
-        owner, dot, what = name.partition(".")
-        if not dot:
-            what = "value"
+        owner, what = curve_parts(name, self.result.model)
+        what = what or "value"
         self._refuse(owner, what)
         if what == "quaternion":
             return self._quaternion(owner)

@@ -54,6 +54,7 @@ from ..model.controller_signals import ConnectedState
 from ..model.element import Element
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import curve_parts
 from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_unknown_coordinates
 from ..tables.coordinate_choice import spanning_joints
 from ..tables.forest import coordinate_row
@@ -197,7 +198,7 @@ def mechanism_symbols(x: Values) -> MechanismSymbols:
 
 def _velocity(x: Values, name: str, unit: str) -> Symbol:
     """Symbol of the coordinate whose rate a velocity is; an angular velocity has its own symbol."""
-    owner, _, what = name.rpartition(".")
+    owner, what = curve_parts(name)
     kind, _, axis = what.rpartition(" ")
     index = latex_part_name(owner)
     if kind == "turn":
@@ -257,7 +258,7 @@ def _controller_state(x: ConnectedState) -> Symbol:
 
 
 def _state(name: str) -> Symbol:
-    owner, _, what = name.rpartition(".")
+    owner, what = curve_parts(name)
     latex = {"place": "s", "work": "W"}.get(what, rf"\mathrm{{{what}}}")
     unit = {"place": "m", "work": "J"}.get(what, "rad")
     return Symbol(

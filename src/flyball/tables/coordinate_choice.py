@@ -20,6 +20,7 @@ from ..model.body import GROUND
 from ..model.force import CoordinateForce
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import curve_parts
 from .constraint_rows import released_joints
 from .forest import body_table, joint_bodies, point_masses
 from .law_inputs import forces_in_events
@@ -46,7 +47,7 @@ def tree_candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, in
         x.element.name for x in forces_in_events(model).values()
     }
     alone = point_masses(model)
-    turning = {f.coordinate_text().partition(".")[0] for f in rotors(model)}
+    turning = {curve_parts(f.coordinate_text())[0] for f in rotors(model)}
     out = {}
     for joint in model.joints:
         worth = rows_saved(joint, model.planar)

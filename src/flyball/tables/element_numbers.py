@@ -6,7 +6,6 @@ They do not depend on the choice of coordinates. Only elements that name a chang
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
@@ -19,6 +18,7 @@ from ..math.vec import cross, matrix_product
 from ..model.body import GROUND, Body
 from ..model.contact import shape_owners
 from ..model.element import Element, resolve
+from ..model.expression_parser import NAME
 from ..model.expressions import Expression
 from ..model.geometry import vector
 from ..model.inertia import mass_properties
@@ -156,7 +156,7 @@ def _parameters_of_elements(model: Model) -> dict[str, frozenset[str]]:
 def names_in(value: Any) -> Iterator[str]:
     """Names in the texts of an element, including shapes and lists in it."""
     if isinstance(value, str):
-        yield from re.findall(r"[^\W\d]\w*", value)
+        yield from NAME.findall(value)
     elif isinstance(value, (tuple, list)):
         for x in value:
             yield from names_in(x)

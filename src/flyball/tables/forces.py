@@ -15,6 +15,7 @@ from ..model.controller import Controller, Sensor
 from ..model.element import LawOf, fields_with
 from ..model.event import Event
 from ..model.force import CoordinateForce, Force
+from ..model.names import curve_parts, is_curve
 from ..model.quantities import Curve, measured_quantity, transmitted_force
 from .constraint_rows import coordinate_frames, coordinate_term, measured_term
 from .forest import coordinate_row
@@ -34,7 +35,9 @@ def measure_quantities(s: Structure, names_in_use: Mapping[str, Event | Controll
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
     own = {x.name for x in s.controls}
     curves = sorted(
-        name for name in names_in_use if "." in name and name not in own and not transmitted_force(s.model, name)
+        name
+        for name in names_in_use
+        if is_curve(s.model, name) and name not in own and not transmitted_force(s.model, name)
     )
     if not sensors and not curves:
         return
@@ -93,7 +96,7 @@ def _sensed_quantity(s: Structure, e: Sensor | Event | Controller, kind: str, te
         measured_term(s, m, frame_index(s, force, "F"), frame_index(s, force, "M"), DISTANCE, 1.0, force)
     elif kind == "spin":
         # about an axis of the world: the angle of ground seen from the body, reversed
-        owner, _, axis = text.partition(".")
+        owner, axis = curve_parts(text)
         measured_term(s, m, frame_index(s, s.model[owner], "M"), 0, turning(axis), -1.0, e)
     else:
         coordinate_term(s, text, e, m, measured=True)

@@ -82,7 +82,7 @@ def _is_zero(value: Any) -> bool:
     if not isinstance(value, str):
         return bool(value == 0)
     try:
-        if not is_number_text(value) and Expression.parse(value).names:
+        if not is_number_text(value) and Expression.parse(value, curves=True).names:
             return False  # decided here: the message about unknown names would look up all units
         return bool(si_numbers(value, {}, "kg*m^2", "inertia") == 0)
     except FlyballError:  # not a number

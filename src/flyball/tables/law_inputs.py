@@ -32,6 +32,7 @@ from ..model.expressions import Expression
 from ..model.force import CoordinateForce, Switch, TwoPointForce
 from ..model.joint import Joint
 from ..model.model import Model
+from ..model.names import is_curve
 from ..model.quantities import EFFORTS, WRENCH, TransmittedForce, transmitted_force
 from .constraint_rows import SwitchSpec, event_names, measured_term, term_from_side_M
 from .structure_definition import Structure, frame_index
@@ -97,7 +98,7 @@ FORCE_READING_CODE = -2_000_000_000
 
 def forces_in_events(model: Model) -> dict[str, TransmittedForce]:
     """Names in expressions of events that denote a force, each with its meaning."""
-    found = {name: transmitted_force(model, name) for name in event_names(model) if "." in name}
+    found = {name: transmitted_force(model, name) for name in event_names(model) if is_curve(model, name)}
     return {name: x for name, x in sorted(found.items()) if x is not None}
 
 
@@ -163,7 +164,7 @@ def _nonsmooth_elements(model: Model) -> list[Element]:
     sensors = {x.name for x in model.sensors}
     out = []
     for e, law, inputs in element_laws(model):
-        moving = {name for name in law.names if name in sensors or "." in name}
+        moving = {name for name in law.names if name in sensors or is_curve(model, name)}
         if has_corners(law, ("t", *inputs), moving) and _is_nonsmooth(model, law):
             out.append(e)
     return out

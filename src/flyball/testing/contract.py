@@ -31,6 +31,7 @@ from ..model.element import Unit, Vector, fields_with, resolve
 from ..model.force import CoordinateForce, Force
 from ..model.geometry import orientation_matrix
 from ..model.joint import Joint, WorldFrame
+from ..model.names import curve_parts
 from ..model.shapes.geometry import polyhedron_integrals
 from ..model.shapes.solid import DIRECTIONS, ConvexSolid
 from ..tables.structure import structure
@@ -94,7 +95,7 @@ def _needed_bodies(e: Force | Joint) -> list[tuple[str, str, str]]:
         return [(CARRIER + x, f"joint of {x}", FRAME) for x in e.ends().values() if x != GROUND]
     found: dict[str, tuple[str, str]] = {x: (f"joint of {x}", "") for x in e.ends().values() if x != GROUND}
     for text in e.along() if isinstance(e, CoordinateForce) else ():
-        owner, _, what = text.partition(".")
+        owner, what = curve_parts(text)
         if what in ("angle", "displacement"):
             found[f"body of {owner}"] = owner, what
         else:

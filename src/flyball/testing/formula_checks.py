@@ -25,6 +25,7 @@ from ..forces import SIGNATURES
 from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.joint import Joint
+from ..model.names import curve_parts
 from ..model.units import powers_in_si
 from ..tables.point_formulas import REMEDIES, force_wrench, law_values, orientation_need, row_wrench
 
@@ -526,7 +527,7 @@ def _rescaled_force(s: Subject, e: Any, new: SimpleNamespace) -> Rescaled:
 
 def _is_angular(e: CoordinateForce) -> int:
     """Return 1 for an angle, 0 for a length."""
-    return int(any(text.partition(".")[2].startswith("angle") for text in e.along()))
+    return int(any(curve_parts(text)[1].startswith("angle") for text in e.along()))
 
 
 def _unit_factor(unit: str) -> float:

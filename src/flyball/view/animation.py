@@ -15,6 +15,7 @@ from ..model.body import GROUND, Body, Frame
 from ..model.controller import Controller
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
+from ..model.names import curve_parts
 from .body_shapes import BodyShapes
 from .comparison_tables import difference_tables, measurement_table
 from .event_marks import event_marks
@@ -151,7 +152,7 @@ def record_comparison(
     source = ""
     if measured is not None:
         found = result.compare(measured)
-        names = [name if "." in name else f"{name}.value" for name in found.names]
+        names = [f"{name}.value" if name in result.model else name for name in found.names]
         recording = _with_channels(recording, result, names)
         columns = zip(names, found.units, found.measured.T, strict=True)
         dots = tuple(MeasuredCurve(name, unit, found.t, values) for name, unit, values in columns)
@@ -415,7 +416,7 @@ def _parts_with_curves(result: Result) -> list:
 
 def _is_main_curve(name: str, result: Result) -> bool:
     """Return whether a curve is a position, or an effort of a driver, force or controller; not a rate or reaction."""
-    owner, _, what = name.partition(".")
+    owner, what = curve_parts(name)
     if owner == "energy" or result.model[owner].category in ("drivers", "forces", "sensors"):
         return True
     if isinstance(e := result.model[owner], Controller):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from ..model.names import curve_parts
 from .figures import MAX_PANEL_CURVES, panels_by_unit
 from .plotting import LEGEND_BESIDE, PALETTE, finish_figure, new_figure, panels_over_time, plot_style, set_title
 from .recording import Channel, Panel
@@ -147,7 +148,7 @@ def _undetermined_note(curves: dict[str, tuple[str, np.ndarray]]) -> str:
     free: dict[str, list[str]] = {}
     for name, (_, values) in curves.items():
         if np.isnan(values).any():
-            joint, _, what = name.rpartition(".")
+            joint, what = curve_parts(name)
             free.setdefault(joint, []).append(what)
     if not free:
         return ""

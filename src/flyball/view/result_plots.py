@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.body import GROUND
+from ..model.names import curve_parts
 from .event_marks import event_marks
 from .figures import centre, count_note, evenly_chosen, hidden_counts, moving_bodies, panels_by_unit, standard_figures
 from .motion_with_events import motion_with_event_states
@@ -176,7 +177,7 @@ def plot_curves(result: Result, *names: str, path: str | os.PathLike | None = No
 
 
 def _curves_of(result: Result, name: str) -> list[Channel]:
-    if "." in name:
+    if curve_parts(name, result.model)[1]:
         return [Channel(name, *result.channel(name))]
     return [Channel(f"{name}.{k}", unit, values) for k, (unit, values) in result[name].channels().items()]
 

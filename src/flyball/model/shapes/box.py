@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class Box(Solid):
     """
 
     edges: Point
+
+    symmetric: ClassVar[str] = "xyz"
 
     def check(self, n: SimpleNamespace) -> None:
         """Three edges greater than zero."""

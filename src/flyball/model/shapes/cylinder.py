@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,8 @@ class Cylinder(Solid):
 
     radius: Length
     length: Length
+
+    symmetric: ClassVar[str] = "xyz"
 
     def check(self, n: SimpleNamespace) -> None:
         """Radius and length greater than zero."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class Ellipsoid(Solid):
     """
 
     semi_axes: Point
+
+    symmetric: ClassVar[str] = "xyz"
 
     def check(self, n: SimpleNamespace) -> None:
         """Three semi-axes greater than zero."""

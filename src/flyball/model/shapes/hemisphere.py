@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class Hemisphere(Sphere):
     ----------
     radius : number [m]
     """
+
+    symmetric: ClassVar[str] = "xy"
 
     def volume(self, n: SimpleNamespace) -> Any:
         """V = 2/3 pi r^3."""

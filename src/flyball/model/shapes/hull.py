@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, element, positive
+from ..placement import Placement
 from .geometry import ConvexPart, Integrals, polygon_outline, polyhedron_integrals, surface_defects
 from .mesh import number_rows
 from .solid import RESOLUTION, Solid
@@ -31,6 +32,10 @@ class Hull(Solid):
 
     vertices: Annotated[Any, number_rows(float)] = field(repr=False)
     scale: Length = 1.0
+
+    def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
+        """Return the reflected points."""
+        return {"vertices": (np.array(self.vertices) @ Placement(mirror=axis).reflection + 0.0).tolist()}
 
     def check(self, n: SimpleNamespace) -> None:
         """Points that span a solid, and a scale greater than zero."""

@@ -41,6 +41,7 @@ class Link(Solid):
     thickness: Length
     normal: Direction | None = None
 
+    symmetric: ClassVar[str] = "xyz"
     points: ClassVar[tuple[str, ...]] = ("position", "start", "end")
 
     def check(self, n: SimpleNamespace) -> None:

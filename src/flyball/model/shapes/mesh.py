@@ -18,6 +18,7 @@ from pydantic import BeforeValidator
 
 from ...errors import ModelError
 from ..element import Length, element, positive
+from ..placement import Placement
 from .geometry import ConvexPart, Integrals, polyhedron_integrals, surface_defects, surface_part, weld_vertices
 from .solid import RESOLUTION, Solid
 
@@ -147,6 +148,12 @@ class Mesh(Solid):
             return Path(os.path.relpath(str(self.file), folder)).as_posix()
         except ValueError:  # on another drive
             return self.file
+
+    def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
+        """Return the reflected triangles, which then no longer come from a file."""
+        mesh = self.triangulation
+        v = mesh.v @ Placement(mirror=axis).reflection + 0.0
+        return {"path": None, "vertices": v.tolist(), "faces": mesh.f[:, ::-1].tolist()}
 
     def check(self, n: SimpleNamespace) -> None:
         """Require a valid surface, and a scale greater than zero."""

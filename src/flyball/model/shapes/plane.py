@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +28,12 @@ class Plane(Surface):
 
     normal: Direction | None = None
     extent: Length | None = None
+
+    symmetric: ClassVar[str] = "xy"
+
+    def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
+        """Return the orientation with z reversed, unless a normal is given."""
+        return {} if self.normal is not None else super().reflected(axis, orientation)
 
     def check(self, n: SimpleNamespace) -> None:
         """A normal with a length, and an extent greater than zero."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, Numbers, Unit, element, positive
+from ..placement import Placement
 from .geometry import ConvexPart, extrude, planar_cross, surface_part
 from .solid import RESOLUTION, Solid
 
@@ -29,6 +30,12 @@ class Prism(Solid):
 
     outline: Outline
     thickness: Length
+
+    symmetric: ClassVar[str] = "z"
+
+    def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
+        """Return the reflected outline."""
+        return {"outline": Placement(mirror=axis).directions(self.outline)}
 
     def check(self, n: SimpleNamespace) -> None:
         """A thickness greater than zero; an outline with an area that does not cross itself."""

@@ -49,6 +49,7 @@ class Rod(Solid):
     end: Point
     radius: Length
 
+    symmetric: ClassVar[str] = "xyz"
     points: ClassVar[tuple[str, ...]] = ("position", "start", "end")
 
     def check(self, n: SimpleNamespace) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
@@ -14,6 +15,7 @@ from ...errors import ModelError
 from ...math.vec import matrix_product
 from ..element import Density, Element, Flag, Mass, Name, Point, positive
 from ..geometry import Orientation, orientation_matrix, vector
+from ..placement import Placement, turned_over
 from .geometry import ConvexPart, arc, lathe, snapped_to_axis
 
 
@@ -81,6 +83,7 @@ class Solid(Element):
 
     category: ClassVar[str] = "shapes"
     points: ClassVar[tuple[str, ...]] = ("position",)  # fields that are points of the body
+    symmetric: ClassVar[str] = ""  # coordinates that may change their sign without changing the solid in its own frame
 
     @property
     def title(self) -> str:
@@ -115,6 +118,32 @@ class Solid(Element):
     def touches(self) -> bool:
         """Return whether it takes part in contact."""
         return not (self.hole or self.looks) if self.contact is None else self.contact
+
+    def mirrored(self, axis: str) -> Solid:
+        """Return its mirror image in the body's reference frame: ``axis`` is the coordinate that changes its sign.
+
+        Raises
+        ------
+        ModelError
+            If its own geometry has no mirror image of the same kind.
+        """
+        place = Placement(mirror=axis)
+        changed: dict[str, Any] = {name: place.points(getattr(self, name)) for name in self.points}
+        changed["orientation"] = place.orientation(self.orientation)
+        if (normal := getattr(self, "normal", None)) is not None:
+            changed["normal"] = place.directions(normal)
+        if axis not in self.symmetric:
+            changed |= self.reflected(axis, changed["orientation"])
+        if changed["orientation"] == self.orientation:
+            del changed["orientation"]
+        return dataclasses.replace(self, **changed)
+
+    def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
+        """Return the fields of a solid that is not symmetric: its reflected geometry, or another orientation."""
+        if not self.symmetric:
+            raise ModelError(f"{self.title}: a {type(self).__name__} has no mirror image; give its body another shape")
+        third = next(a for a in "xyz" if a not in (axis, self.symmetric[0]))
+        return {"orientation": turned_over(orientation, third)}
 
     def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Return its spatial contact geometry: convex parts, in its own frame.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class Sphere(Solid):
     """
 
     radius: Length
+
+    symmetric: ClassVar[str] = "xyz"
 
     def check(self, n: SimpleNamespace) -> None:
         """A radius greater than zero."""

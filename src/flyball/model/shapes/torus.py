@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class Torus(Solid):
 
     radius: Length
     tube_radius: Length
+
+    symmetric: ClassVar[str] = "xyz"
 
     def check(self, n: SimpleNamespace) -> None:
         """Radii greater than zero, and a hole in the middle."""

@@ -24,9 +24,11 @@ from ...errors import ModelError
 from ...forces.coordinate_spring import measuring_spring
 from ...forces.limit import Limit
 from ...math.vec import quaternion_matrix
+from ...model.controller import IMU
 from ...model.force import CoordinateForce, TwoPointForce
 from ...model.geometry import matrix_to_quaternion
 from ...model.model import Model
+from ...model.names import curve_parts
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...results.events import cumulative_exchanges, energies_at_end
@@ -546,7 +548,7 @@ def mechanism_model(model: Model, held: Sequence[str]) -> Model:
         setattr(out, name, [])
     out.bodies = [b for b in out.bodies if b.name not in gone]
     out.frames = [f for f in out.frames if f.name not in gone]
-    out.initial = [e for e in out.initial if e.name.partition(".")[0] not in gone]
+    out.initial = [e for e in out.initial if curve_parts(e.name)[0] not in gone]
     lost = [s for s in out.sensors if any(body in gone for body in _sensor_bodies(s))]
     out.sensors = [s for s in out.sensors if s not in lost]
     for name in (*gone, *(s.name for s in lost)):
@@ -556,8 +558,7 @@ def mechanism_model(model: Model, held: Sequence[str]) -> Model:
 
 def _sensor_bodies(sensor) -> list[str]:
     """Return the names of the elements that a sensor measures."""
-    texts = [getattr(sensor, k, None) for k in ("of", "frame")]
-    return [t.partition(".")[0] for t in texts if isinstance(t, str)]
+    return [sensor.frame] if isinstance(sensor, IMU) else [curve_parts(sensor.of)[0]]
 
 
 CONTACT_MARGIN = 0.01  # gap up to which non-approaching shapes are in contact, relative to the smallest shape

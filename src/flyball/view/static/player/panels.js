@@ -2,7 +2,22 @@
 import { element, pretty } from "./format.js";
 
 const MOST = 300; // channels listed at once
+const FEW = 40; // rows up to which groups are open
 const ENOUGH = 600; // px: in a lower panel the summary is closed, for the plots
+
+/** Rows by the groups of their names, which precede the last ``depth`` words; the rows of a group can be folded. */
+function grouped(rows, names, depth, open, wrap) {
+  const groups = new Map();
+  names.forEach((name, k) => {
+    const group = name.split(".").slice(0, -depth).join(".");
+    groups.set(group, [...(groups.get(group) ?? []), rows[k]]);
+  });
+  const alone = groups.get("") ?? [];
+  groups.delete("");
+  const fold = ([group, inner]) =>
+    element("details", { className: "group", open }, element("summary", { textContent: group }), wrap(inner));
+  return [...alone, ...[...groups].map(fold)];
+}
 
 /** The list of channels: search, tick, and whether those of one unit share a plot. */
 export function channelPicker(panel, button, known, shown, onChange) {
@@ -44,7 +59,10 @@ export function channelPicker(panel, button, known, shown, onChange) {
         : found.length
           ? ""
           : "No channel of that name";
-    list.replaceChildren(...found.slice(0, MOST).map(choice));
+    const listed = found.slice(0, MOST);
+    const names = listed.map(({ name }) => name);
+    const wrap = (rows) => element("div", {}, ...rows);
+    list.replaceChildren(...grouped(listed.map(choice), names, 2, words.length > 0 || found.length <= FEW, wrap));
     if (note) list.append(element("p", { className: "empty", textContent: note }));
   };
   const open = (on) => {
@@ -187,7 +205,11 @@ export function bodyLegend(
       switchButton("eye", `Show ${name}`, true, (on) => onSet(index, on), eye()),
     );
   });
-  box.replaceChildren(...rows, ...sets, ...paths);
+  const names = bodies.map(({ name }) => name);
+  const wrap = (inner) => element("ul", {}, ...inner);
+  const listed = grouped(rows, names, 1, rows.length <= FEW, wrap);
+  const items = listed.map((row) => (row.tagName === "LI" ? row : element("li", { className: "folded" }, row)));
+  box.replaceChildren(...items, ...sets, ...paths);
   toggle.querySelector("span").textContent = bodyCount({ bodies, sets: crowds });
   const open = (on) => {
     box.hidden = !on;
