@@ -18,7 +18,9 @@ ACROSS = (2.0, 1.0, 2.0)  # square to AXIS
 SKEW = (0.3, 1.0, 0.4)
 NORMAL = triad(np.array(AXIS) / 3.0)  # axes with AXIS as z
 ELLIPSE = [(0.3 * np.cos(u), 0.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)]
-LOOP = [(x, y, 0.1 * np.sin(4.0 * np.pi * k / 24)) for k, (x, y) in enumerate(ELLIPSE)]
+OVAL = [(0.3 * np.cos(u), 0.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 96, endpoint=False)]
+LOOP = [(x, y, 0.1 * np.sin(4.0 * np.pi * k / 96)) for k, (x, y) in enumerate(OVAL)]
+C, S = np.cos(0.14181), np.sin(0.14181)  # in the middle between two knots of a curve
 
 JOINTS = [c for c in Joint.registry.values() if issubclass(c, Joint) and c.__module__.startswith(f"{room.__name__}.")]
 
@@ -28,18 +30,18 @@ SPATIAL = {
     "Distance": {"at": (P, Q)},
     "Fixed": {"at": P},
     "FlatFacedCam": {
-        "points": ELLIPSE,
+        "points": OVAL,
         "centre": P,
         "axis": AXIS,
         "at": tuple(P + NORMAL @ (0.3, 0.02, 0.05)),
-        "normal": tuple(NORMAL[:, 0]),
+        "normal": tuple(NORMAL @ (np.cos(0.0785), np.sin(0.0785), 0.0)),
     },
     "GeneralUniversal": {"at": (P, Q), "axes": (AXIS, SKEW)},
     "KnifeEdge": {"at": P, "axis": AXIS, "normal": SKEW},
     "Orientation": {"at": P},
     "Planar": {"at": P, "axis": AXIS, "angle": -0.4},
     "PointInPlane": {"at": P, "axis": AXIS},
-    "PointOnCurve": {"points": LOOP, "centre": P, "at": (P[0] + 0.3, P[1], P[2]), "closed": True},
+    "PointOnCurve": {"points": LOOP, "centre": P, "at": (P[0] + 0.3 * C, P[1] + 0.2 * S, P[2] + 0.05), "closed": True},
     "PointOnLine": {"at": P, "axis": AXIS, "displacement": 0.1},
     "Prismatic": {"at": P, "axis": AXIS, "displacement": 0.2},
     "Revolute": {"at": P, "axis": AXIS, "angle": 2.0},
@@ -54,11 +56,16 @@ PLANAR = {
     "Cam": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.33, P[1]), "radius": 0.03},
     "Distance": {"at": (P[:2], Q[:2])},
     "Fixed": {"at": P[:2]},
-    "FlatFacedCam": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.3, P[1] + 0.05), "normal": (1.0, 0.0)},
+    "FlatFacedCam": {
+        "points": OVAL,
+        "centre": P[:2],
+        "at": (P[0] + 0.3, P[1] + 0.05),
+        "normal": (np.cos(0.0785), np.sin(0.0785)),
+    },
     "KnifeEdge": {"at": P[:2], "axis": (1.0, 2.0)},
     "Orientation": {"at": P[:2]},
     "PinInSlot": {"at": P[:2], "axis": (1.0, 2.0), "angle": 0.3},
-    "PointOnCurve": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.3, P[1]), "closed": True},
+    "PointOnCurve": {"points": OVAL, "centre": P[:2], "at": (P[0] + 0.3 * C, P[1] + 0.2 * S), "closed": True},
     "PointOnLine": {"at": P[:2], "axis": (1.0, 2.0)},
     "Prismatic": {"at": P[:2], "axis": (1.0, 2.0), "displacement": 0.2},
     "Revolute": {"at": P[:2], "angle": 2.0},
@@ -66,6 +73,7 @@ PLANAR = {
     "WheelOnLine": {"at": P[:2], "axis": (1.0, 2.0), "centre": (P[0] - 0.2, P[1] + 0.1), "angle": 0.2},
 }
 
+SPLINED = ("Cam", "FlatFacedCam", "PointOnCurve")  # third derivatives of their curves jump
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]
 
 MASS = {"a": 1.7, "b": 1.1}

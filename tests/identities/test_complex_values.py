@@ -28,7 +28,8 @@ from tests.examples.test_examples import FILES
 from tests.model.test_shapes import SAMPLES
 
 AXES = ("axis", "axes", "normal")  # which axes go with one along a world axis jumps with a change: tested apart
-RIGHT_ANGLES = {"Universal": {"axes"}, "WheelOnLine": {"at", "axis", "centre"}}  # allow no change of one number
+RIGHT_ANGLES = {"FlatFacedCam": {"axis", "normal"}, "Universal": {"axes"}, "WheelOnLine": {"at", "axis", "centre"}}
+"""Fields that allow no change of one number."""
 
 
 def structures(m):
@@ -55,7 +56,9 @@ def check_all(m, skipped=(), refused=()):
 
 @pytest.mark.parametrize(("where", "name"), zoo.CASES)
 def test_every_joint(where, name):
-    check_all(zoo.joined(where, name), refused=RIGHT_ANGLES.get(name, ()))
+    # differences by a point move the places of contact over knots of the profile
+    skipped = ("points",) if name == "FlatFacedCam" else ()
+    check_all(zoo.joined(where, name), skipped, RIGHT_ANGLES.get(name, ()))
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -156,7 +159,7 @@ def test_every_coupling():
 
 
 BY_FRAMES = {"Screw": {"lead": 0.05}, "RollingDisk": {"radius": 0.1}, "RollingBall": {"radius": 0.1}}
-IN_THE_WORLD = ("Cam", "WheelOnLine")  # cannot be told by frames alone
+IN_THE_WORLD = (*zoo.SPLINED, "WheelOnLine")  # cannot be told by frames alone
 
 
 @pytest.mark.parametrize(("where", "name"), [c for c in zoo.CASES if c[1] not in IN_THE_WORLD])
@@ -298,7 +301,7 @@ def test_equations_of_complex_tables(where, name):
     for layer in ((), tree) if tree else ((),):
         x = equations(m, layer)
         for field, parameter in names.items():
-            if field.partition(".")[2] in RIGHT_ANGLES.get(name, ()):
+            if field.partition(".")[2] in RIGHT_ANGLES.get(name, ()) or field == "FlatFacedCam.points":
                 continue
             h = 1e-4
             near = {k: equations(m, layer, {parameter: k * h}).residual for k in (-2, -1, 1, 2)}

@@ -80,19 +80,19 @@ def test_equations_sensitivities_and_constraints():
     assert np.ravel(f)[0] == pytest.approx(4 - 0.6 + 0.06, rel=1e-9)
     pair = fb.Mechanism("surface", planar=True)
     pair.add(fb.Table2D("z", x=X, y=Y, z=Z))
-    for k, name in enumerate("abc"):
+    for k, name in enumerate("pqr"):
         pair.add(fb.Body(name, mass=1, inertia=1, position=(0, k)))
         pair.add(fb.Translational(f"s{name}", "ground", name, at=(0, k), axis=(1, 0)))
-    pair.add(fb.Constraint("c", "sc.displacement - z(sa.displacement, sb.displacement)"))
-    pair.add(fb.Driver("da", "sa.displacement", "0.4*t"), fb.Driver("db", "sb.displacement", "1 + 0.3*t"))
+    pair.add(fb.Constraint("c", "sr.displacement - z(sp.displacement, sq.displacement)"))
+    pair.add(fb.Driver("da", "sp.displacement", "0.4*t"), fb.Driver("db", "sq.displacement", "1 + 0.3*t"))
     r = pair.kinematics(np.linspace(0, 3, 7))
     spline = RectBivariateSpline(X, Y, Z)
     x, y = 0.4 * r.t, 1 + 0.3 * r.t
-    assert r["sc.displacement"] == pytest.approx(spline.ev(x, y), abs=1e-10)
+    assert r["sr.displacement"] == pytest.approx(spline.ev(x, y), abs=1e-10)
     rate = 0.4 * spline.ev(x, y, dx=1) + 0.3 * spline.ev(x, y, dy=1)
-    assert r["sc.rate"] == pytest.approx(rate, abs=1e-9)
+    assert r["sr.rate"] == pytest.approx(rate, abs=1e-9)
     second = 0.16 * spline.ev(x, y, dx=2) + 0.24 * spline.ev(x, y, dx=1, dy=1) + 0.09 * spline.ev(x, y, dy=2)
-    assert r["sc.acceleration"] == pytest.approx(second, abs=1e-8)
+    assert r["sr.acceleration"] == pytest.approx(second, abs=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ class Cam(Joint):
             )
         if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
             raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
-        for k, d in enumerate(np.sqrt((np.diff(_closing(n.points, self.closed), axis=0) ** 2).sum(axis=1))):
+        for k, d in enumerate(np.sqrt((np.diff(closed_polygon(n.points, self.closed), axis=0) ** 2).sum(axis=1))):
             if not d.real > 0.0:
                 raise ModelError(
                     f"{self.title}: points {k} and {(k + 1) % len(n.points)} of its profile coincide at "
@@ -116,7 +116,7 @@ class Cam(Joint):
         if last.real > first.real and self.ended(at.real, first.real, last.real):
             raise ModelError(
                 f"{self.title}: in the reference configuration its follower is beyond an end of the profile, which "
-                f"extends from {_written(n.points[0])} to {_written(n.points[-1])}; {REMEDY}"
+                f"extends from {point_text(n.points[0])} to {point_text(n.points[-1])}; {REMEDY}"
             )
         bend = max(0.0, -self.sharpest(n, side)) * n.radius.real
         if bend >= 1.0:
@@ -134,7 +134,7 @@ class Cam(Joint):
 
     def extent(self, n: SimpleNamespace) -> tuple[Any, Any]:
         """Return the parameters at the ends of the profile; (0, 0) if it continues beyond its points."""
-        return (0.0, 0.0) if self.closed or self.beyond == "line" else (0.0, _chords(n.points, False)[-1])
+        return (0.0, 0.0) if self.closed or self.beyond == "line" else (0.0, chord_lengths(n.points, False)[-1])
 
     @staticmethod
     def ended(at: float, first: float, last: float, near: float = GRACE) -> bool:
@@ -149,14 +149,14 @@ class Cam(Joint):
         k = 0 if at < 0.5 * (first + last) else -1
         return (
             f"the follower of {self.title} is at an end of the profile, point {k % len(n.points)} at "
-            f"{_written(n.points[k])}, and there is none beyond; {REMEDY}"
+            f"{point_text(n.points[k])}, and there is none beyond; {REMEDY}"
         )
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any, float, Any]:
         """Return the parameter of the profile point nearest to M, the side that M is on (+1, -1), and its distance."""
         data = np.concatenate(self.curves(n))
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
-        s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
+        s = np.linspace(0.0, chord_lengths(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         x, _, _, y, _, _ = curve.point(par, s, data)
         p = matrix_product(F[1].T, M[0] - F[0])
         guess = float(s[np.argmin((x - p[0]).real ** 2 + (y - p[1]).real ** 2)])
@@ -170,7 +170,7 @@ class Cam(Joint):
         """Return the least curvature [1/m] towards the given side: negative where the profile is concave there."""
         data = np.concatenate(self.curves(n)).real
         par = (0.0, 0.0, float(len(self.curves(n)[0])))
-        s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
+        s = np.linspace(0.0, chord_lengths(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         _, x1, x2, _, y1, y2 = curve.point(par, s, data)
         return float((side * (x1 * y2 - y1 * x2) / (x1 * x1 + y1 * y1) ** 1.5).min())
 
@@ -181,32 +181,35 @@ class Cam(Joint):
                 f"{self.title}: points of its profile follow parameters, and a curve through symbols is not written "
                 f"out; give these parameters as numbers"
             )
-        return _splines(n.points, self.closed)
+        return profile_splines(n.points, self.closed)
 
 
-def _written(point: tuple) -> str:
+def point_text(point: tuple) -> str:
+    """Return a point with its unit, for messages."""
     return f"({', '.join(f'{x.real:g}' for x in point)}) m"
 
 
-def _closing(points: tuple, closed: bool) -> np.ndarray:
+def closed_polygon(points: tuple, closed: bool) -> np.ndarray:
+    """Return points as an array; if closed, with the first again at the end."""
     p = np.array(points)
     return np.vstack([p, p[:1]]) if closed else p
 
 
-def _chords(points: tuple, closed: bool) -> np.ndarray:
+def chord_lengths(points: tuple, closed: bool) -> np.ndarray:
     """Return the length along the polygon up to each point."""
-    steps = np.sqrt((np.diff(_closing(points, closed), axis=0) ** 2).sum(axis=1))
+    steps = np.sqrt((np.diff(closed_polygon(points, closed), axis=0) ** 2).sum(axis=1))
     return np.r_[0.0, np.cumsum(steps)]
 
 
 @lru_cache(maxsize=64)
-def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
-    s = tuple(_chords(points, closed).tolist())
+def profile_splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
+    """Return the splines x(s) and y(s) through points of the plane, s being the chord length."""
+    s = tuple(chord_lengths(points, closed).tolist())
     beyond: Any = "repeat" if closed else "line"  # the row refuses positions beyond; the search may pass through them
     if np.iscomplexobj(s):
-        real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
-        at, columns = np.array(s), _closing(points, closed).T
+        real = profile_splines(tuple(tuple(x.real for x in p) for p in points), closed)
+        at, columns = np.array(s), closed_polygon(points, closed).T
         steps = (pack_spline(at, c, complex_cubic(at, c, closed), beyond).imag for c in columns)
         return tuple((np.array(r) + 1j * d).tolist() for r, d in zip(real, steps, strict=True))  # type: ignore[return-value]
-    x, y = (tuple(c) for c in _closing(points, closed).T.tolist())
+    x, y = (tuple(c) for c in closed_polygon(points, closed).T.tolist())
     return tuple(Table(k, x=s, y=c, beyond=beyond).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]

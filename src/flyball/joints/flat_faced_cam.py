@@ -15,7 +15,7 @@ from ..math.vec import matrix_product
 from ..model.element import Direction, Flag, Point, element
 from ..model.geometry import vector
 from ..model.joint import Joint, WorldFrame
-from .cam import Points, _chords, _splines
+from .cam import Points, chord_lengths, profile_splines
 
 DIRECTIONS = 360  # directions in which the extent of the profile is computed; a spline goes through these values
 PASSES = 12
@@ -76,7 +76,7 @@ class FlatFacedCam(Joint):
         """Require enough points, each with two coordinates, of a convex profile."""
         if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
             raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
-        if not (np.diff(_chords(n.points, True)).real > 0.0).all():
+        if not (np.diff(chord_lengths(n.points, True)).real > 0.0).all():
             raise ModelError(f"{self.title}: two consecutive points of its profile coincide; leave one out")
         _, bend, at = _profile(n.points, 20 * len(n.points))
         if not bend.min() > 0.0:
@@ -141,8 +141,8 @@ class FlatFacedCam(Joint):
 
 def _profile(points: tuple, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return directions of the outward normals, curvatures (positive: convex) and points of a profile."""
-    x, y = (np.array(c).real for c in _splines(points, True))
-    s = np.linspace(0.0, _chords(points, True)[-1].real, count, endpoint=False)
+    x, y = (np.array(c).real for c in profile_splines(points, True))
+    s = np.linspace(0.0, chord_lengths(points, True)[-1].real, count, endpoint=False)
     (x0, x1, x2), (y0, y1, y2) = spline(x, 0, s), spline(y, 0, s)
     way = np.sign(np.sum(x0 * y1 - y0 * x1))  # 1: counterclockwise
     return (
@@ -155,8 +155,16 @@ def _profile(points: tuple, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
 @lru_cache(maxsize=64)
 def support_function(points: tuple) -> list[float]:
     """Return the periodic spline of the largest c.n over a closed convex profile, for n at angles from 0 to 2 pi."""
-    x, y = (np.array(c) for c in _splines(points, True))
-    length = _chords(points, True)[-1]
+    if np.iscomplexobj(np.array(points)):
+        real = support_function(tuple(tuple(x.real for x in p) for p in points))
+        return (np.array(real) + 1j * np.imag(_fitted(points))).tolist()  # type: ignore[no-any-return]
+    return _fitted(points)
+
+
+def _fitted(points: tuple) -> list[float]:
+    """Return the same for numbers of one type."""
+    x, y = (np.array(c) for c in profile_splines(points, True))
+    length = chord_lengths(points, True)[-1]
     s = np.linspace(0.0, length.real, 20 * len(points), endpoint=False)
     psi = np.linspace(0.0, TURN, DIRECTIONS + 1)
     c, w = np.cos(psi), np.sin(psi)

@@ -11,13 +11,14 @@ import numpy as np
 from ..constraints import space_curve
 from ..constraints.blocks import ACROSS_CURVE, ALONG_CURVE, Row
 from ..errors import ModelError
+from ..math.scalar import atan2
 from ..math.spline import complex_cubic, pack_spline
 from ..math.vec import matrix_product
 from ..model.element import Flag, Numbers, Point, element
 from ..model.expressions import Expression
 from ..model.geometry import vector
 from ..model.joint import Coordinate, Joint, WorldFrame
-from .cam import END_TOLERANCE, GRACE, Points
+from .cam import END_TOLERANCE, GRACE, Points, closed_polygon, point_text
 
 SEGMENTS = 240  # least number of pieces of the spline
 SAMPLES = 960  # points at which formulas are evaluated
@@ -91,7 +92,7 @@ class PointOnCurve(Joint):
             raise ModelError(f"{self.title}: formulas need interval=(first u, last u), and points have none")
         if len(n.points) < 4 or len({len(p) for p in n.points}) != 1 or len(n.points[0]) not in (2, 3):
             raise ModelError(f"{self.title}: a curve needs four points or more, each (x, y) or (x, y, z)")
-        p = _closing(n.points, self.closed)
+        p = closed_polygon(n.points, self.closed)
         if not np.isfinite(p).all():
             raise ModelError(f"{self.title}: a formula has no finite value for some u in {self.interval}")
         steps = np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1))
@@ -100,7 +101,7 @@ class PointOnCurve(Joint):
             last = self.closed and k == len(n.points) - 1
             raise ModelError(
                 f"{self.title}: points {k} and {0 if last else k + 1} of its curve coincide at "
-                f"{_written(n.points[k])}; "
+                f"{point_text(n.points[k])}; "
                 + ("a closed curve does not repeat its first point" if last else "leave one out")
             )
 
@@ -117,7 +118,7 @@ class PointOnCurve(Joint):
         if last.real > first.real and self.ended(at.real, first.real, last.real):
             raise ModelError(
                 f"{self.title}: in the reference configuration its point is beyond an end of the curve, which extends "
-                f"from {_written(n.points[0])} to {_written(n.points[-1])}; {REMEDY}"
+                f"from {point_text(n.points[0])} to {point_text(n.points[-1])}; {REMEDY}"
             )
         return (row.par[0], 0.0, 0.0, 0.0, first, last, 0.0)
 
@@ -138,7 +139,7 @@ class PointOnCurve(Joint):
         k = 0 if at < 0.5 * (first + last) else -1
         return (
             f"the point of {self.title} is at an end of the curve, position {last if k else first:.6g} m at "
-            f"{_written(n.points[k])}, and there is none beyond; {REMEDY}"
+            f"{point_text(n.points[k])}, and there is none beyond; {REMEDY}"
         )
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any]:
@@ -171,15 +172,6 @@ class PointOnCurve(Joint):
         return space_curve_splines(n.points, self.closed)[1]
 
 
-def _written(point: tuple) -> str:
-    return f"({', '.join(f'{x.real:g}' for x in point)}) m"
-
-
-def _closing(points: tuple, closed: bool) -> np.ndarray:
-    p = np.array(points)
-    return np.vstack([p, p[:1]]) if closed else p
-
-
 def _pieces(s: np.ndarray, y: np.ndarray, closed: bool) -> np.ndarray:
     """Return the coefficients of the C2 spline through values y at s, also of complex ones."""
     if np.iscomplexobj(s) or np.iscomplexobj(y):
@@ -191,12 +183,22 @@ def _pieces(s: np.ndarray, y: np.ndarray, closed: bool) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def space_curve_splines(points: tuple, closed: bool) -> tuple[Any, tuple[list[float], ...]]:
-    """Return the length of a curve, and nine splines over its arc length: itself, and two directions across it.
+    """Return the length of a curve, and nine splines over its arc length: itself, and two directions across it."""
+    if not np.iscomplexobj(np.array(points)):
+        return _fitted(points, closed)
+    length, real = space_curve_splines(tuple(tuple(x.real for x in p) for p in points), closed)
+    moved, made = _fitted(points, closed)
+    splines = tuple((np.array(r) + 1j * np.imag(c)).tolist() for r, c in zip(real, made, strict=True))
+    return length + 1j * moved.imag, splines
+
+
+def _fitted(points: tuple, closed: bool) -> tuple[Any, tuple[list[float], ...]]:
+    """Return the same for numbers of one type.
 
     The spline through the points is divided into shorter pieces, whose lengths are integrated by Gauss' method; another
     spline over the arc length goes through their ends.
     """
-    p = _closing(points, closed)
+    p = closed_polygon(points, closed)
     p = np.column_stack([p, np.zeros(len(p))]) if p.shape[1] == 2 else p
     chords = np.r_[0.0, np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))]
     parts = max(1, -(-SEGMENTS // (len(p) - 1)))
@@ -211,7 +213,7 @@ def space_curve_splines(points: tuple, closed: bool) -> tuple[Any, tuple[list[fl
     s = np.r_[0.0, np.cumsum(0.5 * h * (speed @ WEIGHTS))]
     tangents = each[:, 1] + first[:, None] * (2.0 * each[:, 2] + 3.0 * first[:, None] * each[:, 3])
     end = tangents[:1] if closed else knots[-1:] - knots[-2:-1]
-    across = directions_across(knots.real, np.vstack([tangents, end]).real, s.real, closed)
+    across = directions_across(knots, np.vstack([tangents, end]), s, closed)
     if closed:
         knots[-1] = knots[0]
     values = [knots, *across]
@@ -225,8 +227,8 @@ def directions_across(p: np.ndarray, t: np.ndarray, s: np.ndarray, closed: bool)
     On a closed curve the angle by which they miss themselves after a lap is spread over it.
     """
     t = t / np.sqrt((t * t).sum(axis=1, keepdims=True))
-    flat = not np.ptp(p[:, 2]) > 0.0
-    start = np.array([0.0, 0.0, 1.0]) if flat else np.eye(3)[int(np.argmin(np.abs(t[0])))]
+    flat = not np.ptp(p[:, 2].real) > 0.0
+    start = np.array([0.0, 0.0, 1.0]) if flat else np.eye(3)[int(np.argmin(np.abs(t[0].real)))]
     b = np.zeros_like(p)
     b[0] = start - (start @ t[0]) * t[0]
     b[0] /= np.sqrt(b[0] @ b[0])
@@ -235,10 +237,10 @@ def directions_across(p: np.ndarray, t: np.ndarray, s: np.ndarray, closed: bool)
         mirrored, turned = b[k] - 2.0 * (v @ b[k]) / (v @ v) * v, t[k] - 2.0 * (v @ t[k]) / (v @ v) * v
         w = t[k + 1] - turned
         size = w @ w
-        b[k + 1] = mirrored - 2.0 * (w @ mirrored) / size * w if size > 0.0 else mirrored
+        b[k + 1] = mirrored - 2.0 * (w @ mirrored) / size * w if size.real > 0.0 else mirrored
     a = np.cross(b, t)
     if closed:
-        missed = np.arctan2(b[-1] @ a[0], b[-1] @ b[0])
+        missed = atan2(b[-1] @ a[0], b[-1] @ b[0])
         angle = (missed * s / s[-1])[:, None]
         a, b = np.cos(angle) * a + np.sin(angle) * b, np.cos(angle) * b - np.sin(angle) * a
         a[-1], b[-1] = a[0], b[0]

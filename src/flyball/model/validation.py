@@ -102,6 +102,8 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
     elif isinstance(e, Unilateral):
         e.check_range(n, model.unit(e.along()[0], e))
     elif isinstance(e, Force):
+        if hasattr(e, "load") and not model.planar:
+            _refuse_friction_on_curve(model, e)
         placed = e.placed(n, model.planar)
         if placed is None and getattr(n, "at", None) is not None and not isinstance(e, BodyForce):
             raise ModelError(
@@ -116,6 +118,17 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
             turns = f"{e.value / (2 * math.pi):.1f} turns"
             warn_user(f"{e.title}: value {e.value:g} is in rad, {turns}; write '{e.value:g} deg' for degrees, or "
                       f"'{e.value:g} rad'", ModelWarning)  # fmt: skip
+
+
+def _refuse_friction_on_curve(model: Model, e: Any) -> None:
+    """Refuse friction along a curve in space: the load of a joint is computed for one axis."""
+    for text in e.along():
+        joint, what = model.coordinate(text, e)
+        if joint.coordinates[what].row.of_kind.place:
+            raise ModelError(
+                f"{e.title}: friction along a curve in space is not available, since the load on the curve has no "
+                f"fixed axis; give Actuator(..., {text!r}, force='-c*rate'), or describe the mechanism in the plane"
+            )
 
 
 FEW_TURNS = 2.0
