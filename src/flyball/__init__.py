@@ -16,7 +16,7 @@ Describe a mechanism
     Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
-                  RollingDisk, RollingBall, KnifeEdge
+                  RollingDisk, RollingBall, KnifeEdge; LinearActuator: a cylinder, whose length is a coordinate
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque

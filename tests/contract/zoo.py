@@ -28,6 +28,7 @@ SPATIAL = {
     "Fixed": {"at": P},
     "GeneralUniversal": {"at": (P, Q), "axes": (AXIS, SKEW)},
     "KnifeEdge": {"at": P, "axis": AXIS, "normal": SKEW},
+    "LinearActuator": {"at": (P, Q)},
     "Orientation": {"at": P},
     "Planar": {"at": P, "axis": AXIS, "angle": -0.4},
     "PointInPlane": {"at": P, "axis": AXIS},
@@ -46,6 +47,7 @@ PLANAR = {
     "Distance": {"at": (P[:2], Q[:2])},
     "Fixed": {"at": P[:2]},
     "KnifeEdge": {"at": P[:2], "axis": (1.0, 2.0)},
+    "LinearActuator": {"at": (P[:2], Q[:2])},
     "Orientation": {"at": P[:2]},
     "PinInSlot": {"at": P[:2], "axis": (1.0, 2.0), "angle": 0.3},
     "PointOnLine": {"at": P[:2], "axis": (1.0, 2.0)},
@@ -54,6 +56,9 @@ PLANAR = {
     "Translational": {"at": P[:2], "axis": (1.0, 2.0)},
     "WheelOnLine": {"at": P[:2], "axis": (1.0, 2.0), "centre": (P[0] - 0.2, P[1] + 0.1), "angle": 0.2},
 }
+
+AS_DRAWN = {"LinearActuator": lambda at: np.linalg.norm(np.subtract(*at))}
+"""Value of the coordinate as drawn, of joints whose coordinates are not 0 there."""
 
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]
 
@@ -67,6 +72,7 @@ REMOVED = {
         "Fixed": 6,
         "GeneralUniversal": 4,
         "KnifeEdge": 1,
+        "LinearActuator": 0,
         "Orientation": 3,
         "Planar": 3,
         "PointInPlane": 1,
@@ -84,6 +90,7 @@ REMOVED = {
         "Distance": 1,
         "Fixed": 3,
         "KnifeEdge": 1,
+        "LinearActuator": 0,
         "Orientation": 1,
         "PinInSlot": 1,
         "PointOnLine": 1,
@@ -199,6 +206,8 @@ def centre(result: fb.Result, body: str) -> tuple[np.ndarray, ...]:
 
 def wrench(result: fb.Result, body: str) -> tuple[np.ndarray, np.ndarray]:
     """Reaction of the joint on a body: force, and torque about the body's centre of mass."""
+    if not result["J"].element.blocks:
+        return np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
     force, torque = result["J"].reaction(on=body)
     s = result.values.structure
     point = np.stack(result.records.frame(s.frame_at["J", "M", ""])[0], axis=1)

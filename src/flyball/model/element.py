@@ -293,6 +293,7 @@ class Element(metaclass=ElementType):
         ModelError
             If several modules define a class of that name; the message begins with ``where``.
         """
+        _registered(name)
         if len(modules := Element.modules[name]) > 1:
             raise ModelError(
                 f"{where}type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file identifies "
@@ -311,6 +312,10 @@ class Element(metaclass=ElementType):
     def bound(self, model: Any) -> Element:
         """Return the element with properties that depend on the model's other elements; by default itself."""
         return self
+
+    def parts(self, model: Any) -> tuple[Element, ...]:
+        """Return the elements that belong to it: added and replaced with it, and left out of model files."""
+        return ()
 
     def acts(self) -> bool:
         """Return whether it acts by a formula; if not, it only has rows that are active at times (`switches`)."""

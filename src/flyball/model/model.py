@@ -30,6 +30,7 @@ from .snapshot import (
     changed_copy,
     model_copy,
     picklable_state,
+    put_parts,
     refuse_changes,
     same_values,
     snapshot,
@@ -219,8 +220,18 @@ class Model:
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
                 self.by_name[e.name] = e
+            self._add_parts(e)
             last = e
         return last
+
+    def _add_parts(self, e: Element) -> None:
+        """Add the elements that belong to e; if one is invalid, e is not added either."""
+        parts = e.parts(self)
+        try:
+            self._add(*parts)
+        except ModelError as error:
+            put_parts(self, {x.name: None for x in (e, *parts) if x is self.find(x.name)})
+            raise type(error)(f"{e.title}: {error}") from None
 
     def replace(self, e: Element) -> Any:
         """Replace the part of the same name and kind, and check the new one. Return the new part.
@@ -237,9 +248,8 @@ class Model:
         e = e.bound(self)
         check_references(self, e)
         self.validate(e, self.environment())
-        parts = getattr(self, e.category)
-        parts[parts.index(old)] = e
-        self.by_name[e.name] = e
+        put_parts(self, {x.name: None for x in old.parts(self)} | {e.name: e})
+        self._add_parts(e)
         for force in [f for f in self.forces if f.bound(self) is not f]:
             self.replace(force)
         return e

@@ -88,7 +88,7 @@ def _quantity_table(model: Model, name: str) -> Table:
     if e.category == "bulk":
         return body_set_quantities(axes)
     if isinstance(e, Joint):
-        return _of_joint(e, axes)
+        return _of_joint(e, axes) | ({} if e.blocks else _of_locks(model, e))
     if isinstance(e, Force):
         return _of_force(model, e, axes)
     if isinstance(e, Coupling):
@@ -197,11 +197,13 @@ def _of_frame(axes: str) -> Table:
     return out
 
 
-def _of_locks(model: Model, body: Body) -> Table:
-    """Return the lock efforts of a body with coordinates that events lock, one for each."""
-    locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
-    own = dict.fromkeys(what for owner, _, what in (x.rpartition(".") for x in locked) if owner == body.name)
-    units = {what: _effort(body.coordinates[what].unit) for what in own}
+def _of_locks(model: Model, e: Body | Joint) -> Table:
+    """Return the lock efforts of coordinates that events lock, one for each."""
+    locked = {a.what for x in model.events for a in x.do if isinstance(a, Lock)}
+    own = [
+        k for k in e.measured(model.planar) if f"{e.name}.{k}" in locked or (e.name in locked and isinstance(e, Joint))
+    ]
+    units = {what: _effort(e.coordinates[what].unit) for what in own}
     return {f"{what}_effort": Quantity(unit, curve=True, array=True) for what, unit in units.items()}
 
 
@@ -237,6 +239,8 @@ def _of_joint(e: Joint, axes: str) -> Table:
         out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
     if hasattr(e, "nearest"):
         out["place"] = Quantity("m", curve=True)
+    if not e.blocks:  # what acts along its coordinates has efforts of its own
+        return out
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
 
 
@@ -298,7 +302,7 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
     """
     owner, _, what = name.partition(".")
     e = model.find(owner)
-    if isinstance(e, Joint):
+    if isinstance(e, Joint) and e.blocks:
         if model.planar and what in ("fx", "fy", "force", "torque"):
             return TransmittedForce(e, SPIN if what == "torque" else WRENCH.index(what))
         return TransmittedForce(e, WRENCH.index(what)) if what in WRENCH and not model.planar else None

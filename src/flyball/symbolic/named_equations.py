@@ -56,7 +56,7 @@ from ..model.element import Element
 from ..model.joint import Joint
 from ..model.model import Model
 from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_unknown_coordinates
-from ..tables.coordinate_choice import spanning_joints
+from ..tables.coordinate_choice import cut_joints_text, spanning_joints
 from ..tables.forest import coordinate_row
 from ..tables.structure_definition import Structure, velocity_names
 from ..tables.table_definitions import FREE, SPHERICAL, System, Work, map_arrays
@@ -96,10 +96,8 @@ def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wis
 
 
 def _description(model: Model, wish: str, tree: Sequence[str]) -> str:
-    cut = [j.name for j in model.joints if j.name not in tree]
-    more = f"; loops are cut at {', '.join(cut[:8])}" if cut else ""
-    more += f" and {len(cut) - 8} more" if len(cut) > 8 else ""
-    return f"joint: {'as requested' if wish == 'joint' else 'these make the fewest equations'}{more}"
+    why = "as requested" if wish == "joint" else "these make the fewest equations"
+    return f"joint: {why}{cut_joints_text(model, tree)}"
 
 
 def _is_regular(c: CompiledMechanism, wish: str) -> bool:

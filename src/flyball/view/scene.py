@@ -177,7 +177,7 @@ ArrowData = tuple[str, str, str, AttachedFrame, np.ndarray]
 def _all_arrows(result: Result, places: AttachedFrames, most: int) -> Iterator[ArrowData]:
     for joint in evenly_chosen(result.model.joints, most):
         M = places.end(joint.name, "M")
-        if M is not None:
+        if M is not None and joint.blocks:
             force, torque = result[joint.name].reaction()
             yield from _force_and_moment(joint.name, "reaction", M, force, torque)
     for e in evenly_chosen([*result.model.forces, *result.model.limits], most):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,10 @@ class Cylinder(Solid):
 
     radius: Length
     length: Length
+
+    hints: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("at", "force", "body_i"), "a Cylinder is a shape; a hydraulic cylinder between two points is a LinearActuator"
+    )
 
     def check(self, n: SimpleNamespace) -> None:
         """Radius and length greater than zero."""
