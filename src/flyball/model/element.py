@@ -268,6 +268,7 @@ class Element(metaclass=ElementType):
 
     category: ClassVar[str] = "elements"
     in_files: ClassVar[bool] = True  # whether model files may name it; its name is then in the registry
+    shows_parts: ClassVar[bool] = True  # whether pictures show the elements that belong to it
     registry: ClassVar[dict[str, type[Element]]] = {}
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
 

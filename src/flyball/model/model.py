@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from . import controller_signals
-from .body import GROUND, Bodies, Body, Driver, Frame, Ground, Initial
+from .body import GROUND, RATE, Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, Material, MaterialPair
 from .controller import IMU, Controller, Sensor
 from .element import Element, LawOf, Number, field_with, fields_with, python_data, resolve
@@ -301,6 +301,8 @@ class Model:
         """Return (joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
         owner, _, what = text.partition(".")
         found = self.by_name.get(owner)
+        if isinstance(e, Driver) and isinstance(found, Joint):
+            what = what.removesuffix(RATE)
         if isinstance(found, (Body, Frame)):
             axes = found.measured(self.planar)
             if what not in axes:
@@ -354,9 +356,10 @@ class Model:
             self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
     def unit(self, text: str, e: Element) -> str:
-        """Return the unit of a coordinate."""
+        """Return the unit of a coordinate, or of the rate that a driver prescribes."""
         owner, what = self.coordinate(text, e)
-        return owner.coordinates[what].unit
+        unit: str = owner.coordinates[what].unit
+        return f"{unit}/s" if isinstance(e, Driver) and e.of_rate else unit
 
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True) -> Any:
         """Return a law as an expression of t, its inputs, sensors, tables and parameters; refuse other names.

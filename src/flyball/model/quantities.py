@@ -19,7 +19,7 @@ from .controller_signals import controller_names
 from .element import Element, LawOf, Unit, fields_with
 from .event import Lock
 from .expressions import law_expression, number
-from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .force import BodyForce, CoordinateForce, Force, PathForce, TwoFrameForce, TwoPointForce
 from .joint import ORIENTATION_ANGLES, Coupling, Joint
 from .messages import listing, suggest
 from .units import split_quantity
@@ -143,7 +143,7 @@ def single_quantity(model: Model, name: str) -> Quantity:
 
 
 def _effort(unit: str) -> str:
-    return "N*m" if unit == "rad" else "N"
+    return "N*m" if unit.startswith("rad") else "N"
 
 
 def _unit_of(model: Model, text: str) -> str:
@@ -259,6 +259,9 @@ def _of_wrench(axes: str) -> Table:
 def _of_force(model: Model, e: Force, axes: str) -> Table:
     units = {k: _output(model, e, unit) for k, unit in e.outputs.items()}
     out = {k: Quantity(unit, curve=True, array=True) for k, unit in units.items()}
+    if isinstance(e, PathForce):
+        inner = range(1, len(e.bodies) - 1)
+        out |= {f"load_{k + 1}": Quantity("N", curve=k in inner, array=True) for k in range(len(e.bodies))}
     if isinstance(e, (BodyForce, TwoFrameForce)):
         out = _of_wrench(axes) | ({"tz": Quantity("N*m", "torque", curve=True)} if len(axes) == 2 else {}) | out
     return out | {k: Quantity(unit, array=True) for k, unit in (("energy", "J"), ("power", "W"), ("work", "J"))}
@@ -307,6 +310,8 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
             return TransmittedForce(e, SPIN if what == "torque" else WRENCH.index(what))
         return TransmittedForce(e, WRENCH.index(what)) if what in WRENCH and not model.planar else None
     if isinstance(e, CoordinateForce) and what in list(e.outputs)[2:3]:
+        if other := e.transmitted():
+            return transmitted_force(model, other)
         way = getattr(e, "direction", 1.0)  # as results tell it
         return None if isinstance(way, str) else TransmittedForce(e, 0 if e.sign * way > 0.0 else 1)
     return TransmittedForce(e, 0) if isinstance(e, Driver) and what == "effort" else None

@@ -181,6 +181,11 @@ def _parts_of(model: Model, e: Element | None) -> tuple[Element, ...]:
     return () if e is None else e.parts(model)
 
 
+def hidden_parts(model: Model) -> set[str]:
+    """Return the names of the elements that belong to others and that pictures leave out."""
+    return {name for name, e in part_owners(model).items() if not e.shows_parts}
+
+
 def part_owners(model: Model) -> dict[str, Element]:
     """Return the names of the elements that belong to others, with these."""
     return {p.name: e for e in model.elements() for p in e.parts(model)}

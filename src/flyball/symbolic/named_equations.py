@@ -59,7 +59,7 @@ from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_
 from ..tables.coordinate_choice import cut_joints_text, spanning_joints
 from ..tables.forest import coordinate_row
 from ..tables.structure_definition import Structure, velocity_names
-from ..tables.table_definitions import FREE, SPHERICAL, System, Work, map_arrays
+from ..tables.table_definitions import FREE, OF_RATE, SPHERICAL, System, Work, map_arrays
 from ..tables.values import Values
 
 RANK_TOLERANCE = (
@@ -289,7 +289,7 @@ def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
         if what == "effort"
         else (r"\lambda", what.removeprefix("lam").removeprefix("_").removeprefix("n"))
     )
-    unit = ("N*m" if s.model.unit(e.coordinate, e) == "rad" else "N") if isinstance(e, Driver) else ""
+    unit = ("N*m" if s.model.unit(e.coordinate, e).startswith("rad") else "N") if isinstance(e, Driver) else ""
     return Symbol(
         name, "multiplier", _indexed(letter, (index + "," if index else "") + latex_part_name(e.name)), unit, e.name
     )
@@ -329,7 +329,7 @@ def with_whole_turns(x: Values, S: System) -> tuple[System, list[int]]:
             hint[k] = len(s.states) + len(more)
             parameters[k, 0] = 1.0
             more.append(k)
-    rows = S.rows._replace(wrapped=np.zeros_like(S.rows.wrapped))
+    rows = S.rows._replace(wrapped=np.where(S.rows.wrapped == OF_RATE, OF_RATE, 0))
     return S._replace(rows=rows, terms=S.terms._replace(hint=hint), term_parameters=parameters), more
 
 
