@@ -28,6 +28,7 @@ USES = {
         'fb.GeneralUniversal("link", "shaft", "fork", at=((0, 0, 0), (0.1, 0, 0)), axes=((1, 0, 0), (0, 1, 0.2)))'
     ),
     "KnifeEdge": 'fb.KnifeEdge("skate", "ground", "sleigh", at=(0, 0), axis=(1, 0))',
+    "LinearActuator": 'fb.LinearActuator("boom", "ground", "arm", at=((0, -1), (1, 0)), length="1.4 + 0.1*sin(t)")',
     "Orientation": 'fb.Orientation("parallel", "ground", "table", at=(0, 0))',
     "PinInSlot": 'fb.PinInSlot("slot", "lever", "block", at=(0, 0.3), axis=(0, 1))',
     "Planar": 'fb.Planar("table", "ground", "puck", at=(0, 0, 0), axis=(0, 0, 1))',

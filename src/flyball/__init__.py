@@ -16,7 +16,8 @@ Describe a mechanism
     Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, PointOnCurve, Cam,
-                  FlatFacedCam, WheelOnLine, RollingDisk, RollingBall, KnifeEdge
+                  FlatFacedCam, WheelOnLine, RollingDisk, RollingBall, KnifeEdge; LinearActuator: a cylinder, whose
+                  length is a coordinate
     couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque

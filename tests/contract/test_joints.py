@@ -9,6 +9,7 @@ from flyball.engine.entry_point import MOTION
 from flyball.engine.motion import derivative
 from flyball.model.model_files import dumps, loads
 from tests.contract.zoo import (
+    AS_DRAWN,
     CASES,
     GRAVITY,
     JOINTS,
@@ -78,6 +79,7 @@ def test_coordinates_and_their_derivatives(where, name):
         assert at_moments(rate) == pytest.approx(difference(value), rel=1e-8, abs=1e-7)
         assert at_moments(second) == pytest.approx(difference(rate), rel=1e-7, abs=1e-6)
         start = joint.element.offset(r.values.numbers["J"], what)
+        start += AS_DRAWN[name](joint.element.at) if name in AS_DRAWN else 0.0
         assert value[0] == pytest.approx(start, abs=1e-12), "as drawn"
     if "angle" in own:
         assert np.ptp(joint.angle) > 2.0 * np.pi, "a test of turns has to turn"

@@ -22,6 +22,7 @@ SWAPPED = {  # joints that are the same from either side, and what of their desc
     "Distance": ("at",),
     "Fixed": (),
     "GeneralUniversal": ("at", "axes"),
+    "LinearActuator": ("at",),
     "Orientation": (),
     "Prismatic": (),
     "Revolute": (),

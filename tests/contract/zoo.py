@@ -38,6 +38,7 @@ SPATIAL = {
     },
     "GeneralUniversal": {"at": (P, Q), "axes": (AXIS, SKEW)},
     "KnifeEdge": {"at": P, "axis": AXIS, "normal": SKEW},
+    "LinearActuator": {"at": (P, Q)},
     "Orientation": {"at": P},
     "Planar": {"at": P, "axis": AXIS, "angle": -0.4},
     "PointInPlane": {"at": P, "axis": AXIS},
@@ -63,6 +64,7 @@ PLANAR = {
         "normal": (np.cos(0.0785), np.sin(0.0785)),
     },
     "KnifeEdge": {"at": P[:2], "axis": (1.0, 2.0)},
+    "LinearActuator": {"at": (P[:2], Q[:2])},
     "Orientation": {"at": P[:2]},
     "PinInSlot": {"at": P[:2], "axis": (1.0, 2.0), "angle": 0.3},
     "PointOnCurve": {"points": OVAL, "centre": P[:2], "at": (P[0] + 0.3 * C, P[1] + 0.2 * S), "closed": True},
@@ -74,6 +76,9 @@ PLANAR = {
 }
 
 SPLINED = ("Cam", "FlatFacedCam", "PointOnCurve")  # third derivatives of their curves jump
+AS_DRAWN = {"LinearActuator": lambda at: np.linalg.norm(np.subtract(*at))}
+"""Value of the coordinate as drawn, of joints whose coordinates are not 0 there."""
+
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]
 
 MASS = {"a": 1.7, "b": 1.1}
@@ -87,6 +92,7 @@ REMOVED = {
         "FlatFacedCam": 1,
         "GeneralUniversal": 4,
         "KnifeEdge": 1,
+        "LinearActuator": 0,
         "Orientation": 3,
         "Planar": 3,
         "PointInPlane": 1,
@@ -106,6 +112,7 @@ REMOVED = {
         "Fixed": 3,
         "FlatFacedCam": 1,
         "KnifeEdge": 1,
+        "LinearActuator": 0,
         "Orientation": 1,
         "PinInSlot": 1,
         "PointOnCurve": 1,
@@ -222,6 +229,8 @@ def centre(result: fb.Result, body: str) -> tuple[np.ndarray, ...]:
 
 def wrench(result: fb.Result, body: str) -> tuple[np.ndarray, np.ndarray]:
     """Reaction of the joint on a body: force, and torque about the body's centre of mass."""
+    if not result["J"].element.blocks:
+        return np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
     force, torque = result["J"].reaction(on=body)
     s = result.values.structure
     point = np.stack(result.records.frame(s.frame_at["J", "M", ""])[0], axis=1)

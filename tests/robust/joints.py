@@ -27,6 +27,10 @@ def _distance(d: Dice, name: str, i: str, j: str, p):
     return fb.Distance(name, i, j, at=(p, plus(p, d.size(1e-3, 1.0), d.direction())))
 
 
+def _linear_actuator(d: Dice, name: str, i: str, j: str, p):
+    return fb.LinearActuator(name, i, j, at=(p, plus(p, d.size(1e-3, 1.0), d.direction())))
+
+
 def _universal(d: Dice, name: str, i: str, j: str, p):
     a = d.direction()
     return fb.Universal(name, i, j, at=p, axes=(a, d.square_to(a)))
@@ -82,6 +86,7 @@ PLANAR = {
     "PointOnLine": _axis("PointOnLine"),
     "PinInSlot": _axis("PinInSlot"),
     "Distance": _distance,
+    "LinearActuator": _linear_actuator,
     "Orientation": _at("Orientation"),
     "Fixed": _at("Fixed"),
     "WheelOnLine": _wheel,
@@ -102,6 +107,7 @@ SPATIAL = {
     "PointOnLine": _axis("PointOnLine"),
     "Screw": _screw,
     "Distance": _distance,
+    "LinearActuator": _linear_actuator,
     "RollingDisk": _rolling_disk,
     "RollingBall": _rolling_ball,
     "KnifeEdge": _knife_edge,

@@ -437,7 +437,7 @@ def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[s
     model = model.snapshot()
     tables = model.law_tables()
     laws = model.cache.get("laws of drivers", None, 1, lambda: {d.name: _driver_law(model, d) for d in model.drivers})
-    for d in model.drivers:
+    for d in (x for x in model.drivers if not x.of_rate):
         law = laws[d.name]
         if law.names <= {"t", *env}:
             out[d.coordinate] = law.evaluate({**env, "t": t}, tables=tables)

@@ -2,6 +2,8 @@
 
     g = sum c_k value_k - f(t),  G v = nu = f',  G vdot = gamma = f'' - sum c_k bias_k
 
+or, for a law f of the rate, G v = nu = f, G vdot = gamma = f' - sum c_k bias_k.
+
 A row is a sum of unit wrenches on frames less a law of time; G[row, d] is the power of the row's wrench along twist
 column d, whatever the coordinates. A measured quantity is the same without a law: value, gradient, rate, bias. Where a
 driver's law reads sensors s, g = sum c_k value_k - f(t, s), and the sensors' gradients times df/ds are subtracted from
@@ -20,6 +22,7 @@ from ..constraints.switches.switch_kind import OFF, STEADY
 from ..laws.bytecode import evaluate, evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..math.vec import add, cross, load3, neg, scale, store3, sub
+from ..tables.table_definitions import OF_RATE
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7
@@ -222,6 +225,10 @@ def end(S, W, t):
             W.rows.value[k] = atan2(sin(g), cos(g)) if S.rows.wrapped[k] == 1 else g
             W.rows.nu[k] = f1
             W.rows.nu_dot[k] = f2
+            if S.rows.wrapped[k] == OF_RATE:
+                W.rows.value[k] = 0.0
+                W.rows.nu[k] = f
+                W.rows.nu_dot[k] = f1
         else:
             W.rows.nu[k] = 0.0
             W.rows.nu_dot[k] = 0.0
@@ -304,6 +311,10 @@ def update_measured_rates(S, W, v):
 def end_biases(S, W, t):
     """End of the biases: gamma of laws that read sensors uses f'' along the motion in place of the time derivative."""
     clear_inactive_biases(S, W)
+    for k in range(S.rows.law.shape[0]):
+        if S.rows.wrapped[k] == OF_RATE:
+            _, f1, _ = evaluate_jet(S.code, S.const, S.rows.law[k], W.stack, t, W.sensed, ALONG_MOTION)
+            W.rows.gamma[k] += f1 - W.rows.nu_dot[k]
     last = -1
     for x in range(S.sensor_drivers.row.shape[0]):
         k = S.sensor_drivers.row[x]

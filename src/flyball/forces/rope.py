@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..compiler.formulas import formula
 from ..constraints.switches.elastic_stop import ELASTIC
 from ..constraints.switches.stop import STOP
 from ..constraints.switches.switch_kind import FROZEN
+from ..errors import ModelError
 from ..math.scalar import choose, maximum
+from ..model.body import Body, Driver
 from ..model.contact import check_restitution
-from ..model.element import Damping, Length, Ratio, Stiffness, element, nonnegative
+from ..model.element import Damping, Element, Law, LawOf, Length, Ratio, Stiffness, element, nonnegative
 from ..model.force import PathForce, Switch, check_elastic
-from .limit import stop_switch_numbers
+from .limit import Limit, stop_switch_numbers
+from .motor import LITTLE
+
+if TYPE_CHECKING:
+    from ..model.model import Model
 
 KIND = 2
 
@@ -45,6 +53,18 @@ RIGID_ROPE, ELASTIC_ROPE = replace(STOP, **_WORDS), replace(ELASTIC, **_WORDS)  
 
 
 @element
+class LengthLimit(Limit):
+    """The largest length of a path and of the rope on a drum, with the words of a rope."""
+
+    in_files: ClassVar[bool] = False
+
+    def switches(self) -> tuple[Switch, ...]:
+        """Return one switch along the sum."""
+        (stop,) = super().switches()
+        return (replace(stop, kind=ELASTIC_ROPE if self.acts() else RIGID_ROPE),)
+
+
+@element
 class Rope(PathForce):
     """A rope that runs without friction over points of bodies: the tension is the same everywhere.
 
@@ -52,6 +72,12 @@ class Rope(PathForce):
     and this is positive; otherwise it is slack. Without a stiffness it is inextensible: when it becomes taut at the
     speed v it rebounds at ``restitution`` times v. Intermediate points are frictionless eyes or small pulleys; a body
     may occur more than once.
+
+    A winch winds it up: with ``drum`` and ``radius`` its free length is ``length`` less radius times the drum's angle,
+    and the tension turns the drum. With ``feed`` it is ``length`` plus that law. Such a rope consists of elements of
+    its own, which decide what an analysis makes of it: coordinates ``NAME_1``, ``NAME_2``, ... of its straight parts
+    (`LinearActuator`), a `Limit` ``NAME_limit`` of their sum with the rope on the drum, and for ``feed`` a slide
+    ``NAME_feed`` on ground with a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``.
 
     Parameters
     ----------
@@ -65,25 +91,37 @@ class Rope(PathForce):
     damping : number [N s/m]
         Of an elastic rope.
     length : number [m]
-        Free length; that in the reference configuration if not given.
+        Free length; that in the reference configuration if not given. With ``drum`` or ``feed`` at an angle and a law
+        of zero; required with points that are frames.
+    drum : str
+        Angle of the winch, ``"J.angle"``. The end of the path on the drum is a point of the body that carries the drum.
+    radius : number [m]
+        Of the drum: positive if a growing angle winds the rope up.
+    feed : law [m]
+        Rope paid out, an expression of ``t``, tables, parameters and sensors of positions.
     restitution : number [1]
         Of an inextensible rope, from 0 (it stays taut; the default) to 1.
 
     Notes
     -----
-    A result contains ``length``, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack.
+    A result contains the ``length`` of the path, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack;
+    ``load_1``, ``load_2``, ...: the magnitude of the force on each point, such as the bearing of a pulley.
     """
 
     stiffness: Stiffness | None = None
     damping: Damping = 0.0
     length: Length | None = None
     restitution: Ratio | None = None
+    drum: str | None = None
+    radius: Length | None = None
+    feed: Law | None = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N", "taut": "1"}
     single: ClassVar[str] = "rope"
+    shows_parts: ClassVar[bool] = False
 
     def check(self, n: SimpleNamespace) -> None:
         """Require enough points, and valid constants."""
@@ -91,6 +129,68 @@ class Rope(PathForce):
         check_restitution(self, n)
         check_elastic(self, n, "a rope that does not stretch")
         nonnegative(self, n, "length")
+        if (self.drum is None) != (n.radius is None) or n.radius == 0.0:
+            raise ModelError(f"{self.title}: a drum has an angle and a radius; give drum='J.angle' and radius=, not 0")
+        if self._winds() and n.length is None and n.at is None:
+            raise ModelError(f"{self.title}: its points are frames; give its free length too: length=")
+
+    def examine(self, model: Model) -> None:
+        """Require an angle of the drum, and a law that its driver accepts."""
+        if self.drum is not None and model.unit(self.drum, self) != "rad":
+            raise ModelError(f"{self.title}: drum is {self.drum!r}, which is no angle; name that of a joint: 'J.angle'")
+        model.law(self.feed, LawOf("m"), f"feed of {self.title}", driver=True)
+
+    def _winds(self) -> bool:
+        return self.drum is not None or self.feed is not None
+
+    def parts(self, model: Model) -> tuple[Element, ...]:
+        """Return the straight parts, their limit, and the slide that pays out."""
+        if not self._winds():
+            return ()
+        line: Any = Element.of_type("LinearActuator")  # joints are not known here
+        spans = self._spans(model)
+        out: list[Element] = [line(f"{self.name}_{k}", *ends, at=at) for k, ends, at, moves in spans if moves]
+        coordinates: Any = [f"{x.name}.length" for x in out]
+        weights: Any = [1.0] * len(out)
+        if self.feed is not None:
+            out += self._slide(self.feed, model.planar)
+            coordinates, weights = [*coordinates, f"{self.name}_feed.displacement"], [*weights, -1.0]
+        if self.drum is not None:
+            coordinates, weights = [*coordinates, self.drum], [*weights, self.radius]
+        if self.length is None:
+            length: Any = _distance_text(at for _, _, at, moves in spans if moves)
+        elif fixed := _distance_text(at for _, _, at, moves in spans if not moves):
+            length = f"({self.length}) - ({fixed})"
+        else:
+            length = self.length
+        own: Any = {"stiffness": self.stiffness, "damping": self.damping, "restitution": self.restitution}
+        return (*out, LengthLimit(f"{self.name}_limit", coordinates, weights=weights, upper=length, **own))
+
+    def _spans(self, model: Model) -> list[tuple[int, tuple[str, str], Any, bool]]:
+        """Return (number, bodies, points, whether its length changes) of each straight part."""
+        points = [None] * len(self.bodies) if self.at is None else list(self.at)
+        out = []
+        for k, (ends, at) in enumerate(zip(pairwise(self.bodies), pairwise(points), strict=True), 1):
+            moves = model.carrier(ends[0], self) != model.carrier(ends[1], self)
+            if not moves and at[0] is None:
+                raise ModelError(f"{self.title}: {ends[0]!r} and {ends[1]!r} are on one body; give points: at=")
+            out.append((k, ends, None if at[0] is None else at, moves))
+        return out
+
+    def _slide(self, feed_law: Law, planar: bool) -> tuple[Element, ...]:
+        """Return a body on a slide that follows the law of feed; its mass, place and axis have no effect."""
+        end, feed = f"{self.name}_end", f"{self.name}_feed"
+        slide: Any = Element.of_type("Prismatic")
+        n = 2 if planar else 3
+        return (
+            Body(end, mass=LITTLE, inertia=LITTLE if planar else (LITTLE,) * 3, position=(0.0,) * n),
+            slide(feed, "ground", end, at=(0.0,) * n, axis=(1.0, *(0.0,) * (n - 1))),
+            Driver(f"{self.name}_drive", f"{feed}.displacement", feed_law),
+        )
+
+    def transmitted(self) -> str:
+        """Return the curve of the limit that carries its tension; empty if it acts itself."""
+        return f"{self.name}_limit.force" if self._winds() else ""
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the parameters of the formulas."""
@@ -101,11 +201,13 @@ class Rope(PathForce):
         return separation if n.length is None else n.length
 
     def acts(self) -> bool:
-        """Return whether it acts as a force: it does if it is elastic."""
-        return self.stiffness is not None
+        """Return whether it acts as a force: it does if it is elastic; with a winch its parts act."""
+        return self.stiffness is not None and not self._winds()
 
     def switches(self) -> tuple[Switch, ...]:
         """Return one switch along its length."""
+        if self._winds():
+            return ()
         return (Switch(ELASTIC_ROPE if self.acts() else RIGID_ROPE, path=self.path(), slides=self.acts()),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
@@ -115,3 +217,9 @@ class Rope(PathForce):
     def conservative(self) -> bool:
         """Return whether it has no damping, so that it only exchanges stored energy."""
         return self.damping == 0.0
+
+
+def _distance_text(spans: Iterable[Any]) -> str:
+    """Return an expression of the sum of the distances of pairs of points."""
+    squares = (" + ".join(f"(({y}) - ({x}))**2" for x, y in zip(a, b, strict=True)) for a, b in spans)
+    return " + ".join(f"sqrt({x})" for x in squares)

@@ -26,6 +26,7 @@ from .flat_faced_cam import FlatFacedCam as FlatFacedCam
 from .gear_pair import GearPair as GearPair
 from .general_universal import GeneralUniversal as GeneralUniversal
 from .knife_edge import KnifeEdge as KnifeEdge
+from .linear_actuator import LinearActuator as LinearActuator
 from .orientation import Orientation as Orientation
 from .planar import Planar as Planar
 from .point_in_plane import PointInPlane as PointInPlane

@@ -256,9 +256,13 @@ class Frame(Located):
     rotation = Body.rotation
 
 
+RATE = "_rate"
+"""Ending of the name of a coordinate's rate."""
+
+
 @element
 class Driver(Element):
-    """A coordinate that follows a prescribed function of time (a rheonomic constraint).
+    """A coordinate, or its rate, that follows a prescribed function of time (a rheonomic constraint).
 
     Drivers of ``x``, ``y``, ``z``, ``roll``, ``pitch``, ``yaw`` of a frame (in the plane ``x``, ``y``, ``angle``)
     prescribe its whole motion. Angles are those of R = R_z(yaw) R_y(pitch) R_x(roll), with whole turns of roll and yaw;
@@ -274,10 +278,12 @@ class Driver(Element):
     name : str
     coordinate : str
         ``"joint.coordinate"`` such as ``"A.angle"``; or of a body or frame ``x``, ``y``, ``z`` of its origin in the
-        world, and ``roll``, ``pitch``, ``yaw`` (in the plane ``angle``) of its axes: ``"slider.x"``.
+        world, and ``roll``, ``pitch``, ``yaw`` (in the plane ``angle``) of its axes: ``"slider.x"``. Or the rate of a
+        joint's coordinate, ``"A.angle_rate"``: a motor that runs at a speed from any position.
     law : expression
-        Its value [rad] or [m], an expression of ``t``, tables, parameters, and sensors of positions and angles; its
-        derivatives are exact. Python functions are not permitted, since their derivatives are unknown.
+        Its value [rad] or [m], or the rate [rad/s] or [m/s]: an expression of ``t``, tables, parameters, and sensors of
+        positions and angles; its derivatives are exact. Python functions are not permitted, since their derivatives
+        are unknown.
     """
 
     coordinate: str = field(kw_only=False)
@@ -285,6 +291,16 @@ class Driver(Element):
 
     category: ClassVar[str] = "drivers"
     omission: ClassVar[float] = 0.5  # cost of omitting it as a remedy for redundant constraints
+
+    @property
+    def of_rate(self) -> bool:
+        """Return whether it prescribes a rate: a constraint of velocities only."""
+        return self.coordinate.endswith(RATE)
+
+    @property
+    def moved(self) -> str:
+        """Return the coordinate that it moves."""
+        return self.coordinate.removesuffix(RATE)
 
 
 @element

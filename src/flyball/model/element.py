@@ -268,6 +268,7 @@ class Element(metaclass=ElementType):
 
     category: ClassVar[str] = "elements"
     in_files: ClassVar[bool] = True  # whether model files may name it; its name is then in the registry
+    shows_parts: ClassVar[bool] = True  # whether pictures show the elements that belong to it
     registry: ClassVar[dict[str, type[Element]]] = {}
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
     local: ClassVar[tuple[str, ...]] = ()  # vectors and orientations along its own or its body's axes, not the world's
@@ -295,6 +296,7 @@ class Element(metaclass=ElementType):
         ModelError
             If several modules define a class of that name; the message begins with ``where``.
         """
+        _registered(name)
         if len(modules := Element.modules[name]) > 1:
             raise ModelError(
                 f"{where}type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file identifies "
@@ -328,6 +330,10 @@ class Element(metaclass=ElementType):
             If it cannot act along a reversed coordinate.
         """
         raise ModelError(f"{self.title}: a {type(self).__name__} cannot act along a coordinate that is reversed")
+
+    def parts(self, model: Any) -> tuple[Element, ...]:
+        """Return the elements that belong to it: added and replaced with it, and left out of model files."""
+        return ()
 
     def acts(self) -> bool:
         """Return whether it acts by a formula; if not, it only has rows that are active at times (`switches`)."""

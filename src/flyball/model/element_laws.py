@@ -82,9 +82,9 @@ def _input_unit(model: Model, e: Driver | Force, of: LawOf) -> str:
 def possible_inputs(model: Model) -> dict[str, tuple[Any, str, int, LawOf]]:
     """Return the inputs besides the parameters: name -> (element, field of the law, component, measured quantity)."""
     out: dict[str, tuple[Any, str, int, LawOf]] = {}
-    for d in model.drivers:
+    for d in (x for x in model.drivers if not x.of_rate):
         out[d.name] = (d, "law", -1, LawOf(model.unit(d.coordinate, d)))
-    for e in model.forces:
+    for e in (x for x in model.forces if x.acts()):
         laws = fields_with(e.__class__, LawOf)
         for field, of in laws.items():
             value = getattr(e, field)

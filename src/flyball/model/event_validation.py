@@ -68,7 +68,8 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
             raise ModelError(f"{what}: {found.title} has nothing that can be released")
         return LockTarget(joint=a.what)
     if found is not None and (found.category == "limits" or getattr(found, "single", "") == "rope"):
-        return LockTarget(element=a.what)
+        parts = [p.name for p in found.parts(model) if p.category == "limits"]
+        return LockTarget(element=parts[0] if parts else a.what)
     if found is None:
         known = [*(j.name for j in model.joints), *(x.name for x in model.limits)]
         raise ModelError(
@@ -167,7 +168,7 @@ def _check_action(model: Model, e: Event, a: Action) -> None:
 
 
 def _refuse_driven(e: Event, a: Action, d: Driver, text: str) -> None:
-    if d.coordinate == text:
+    if d.moved == text:
         raise ModelError(
             f"{e.title}: {a.title}: {d.title} prescribes {text!r}, so nothing can be locked there; use an Actuator or "
             "a Motor, or a law that becomes constant: where(t < 1, t, 1)"

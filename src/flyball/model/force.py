@@ -191,6 +191,10 @@ class CoordinateForce(Force):
         """Return the inertia that it adds to the mass matrix along its coordinate [kg] or [kg m^2]."""
         return 0.0
 
+    def transmitted(self) -> str:
+        """Return the curve of the element that carries its effort, if it belongs to it; empty if it acts itself."""
+        return ""
+
     def path(self) -> tuple[tuple[str, str, Row], ...]:
         """Return the terms (role of F, role of M, formula) of the sum along which it acts, if it has no coordinates."""
         return ()

@@ -36,6 +36,8 @@ NAMES_ELSEWHERE = {
     "solidbody": "Body", "marker": "Frame", "site": "Frame", "point": "Frame", "system": "Mechanism",
     "multibodysystem": "Mechanism", "world": "Mechanism", "model": "Mechanism", "brick": "Box", "cuboid": "Box",
     "stop": "Limit", "endstop": "Limit", "jointlimit": "Limit", "friction": "JointFriction",
+    "hydrauliccylinder": "LinearActuator", "pneumaticcylinder": "LinearActuator", "ram": "LinearActuator",
+    "piston": "LinearActuator", "linearmotor": "LinearActuator", "winch": "Rope",
     "simulator": "Stepper", "environment": "Stepper",
 }  # fmt: skip
 """Names of parts in other programs, in lower case, and the names here."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from . import controller_signals
-from .body import GROUND, Bodies, Body, Driver, Frame, Ground, Initial
+from .body import GROUND, RATE, Bodies, Body, Driver, Frame, Ground, Initial
 from .contact import Contact, Material, MaterialPair
 from .controller import IMU, Controller, Sensor
 from .element import Element, LawOf, Number, field_with, fields_with, python_data, resolve
@@ -31,6 +31,7 @@ from .snapshot import (
     changed_copy,
     model_copy,
     picklable_state,
+    put_parts,
     refuse_changes,
     same_values,
     snapshot,
@@ -286,8 +287,18 @@ class Model:
             if not isinstance(e, Initial):
                 self.by_name[e.name] = e
                 self.groups.update(groups_of(e.name))
+            self._add_parts(e)
             last = e
         return last
+
+    def _add_parts(self, e: Element) -> None:
+        """Add the elements that belong to e; if one is invalid, e is not added either."""
+        parts = e.parts(self)
+        try:
+            self._add(*parts)
+        except ModelError as error:
+            put_parts(self, {x.name: None for x in (e, *parts) if x is self.find(x.name)})
+            raise type(error)(f"{e.title}: {error}") from None
 
     def replace(self, e: Element) -> Any:
         """Replace the part of the same name and kind, and check the new one. Return the new part.
@@ -304,9 +315,8 @@ class Model:
         e = e.bound(self)
         check_references(self, e)
         self.validate(e, self.environment())
-        parts = getattr(self, e.category)
-        parts[parts.index(old)] = e
-        self.by_name[e.name] = e
+        put_parts(self, {x.name: None for x in old.parts(self)} | {e.name: e})
+        self._add_parts(e)
         for force in [f for f in self.forces if f.bound(self) is not f]:
             self.replace(force)
         return e
@@ -358,6 +368,8 @@ class Model:
         """Return (joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
         owner, what = curve_parts(text, self.by_name)
         found = self.by_name.get(owner)
+        if isinstance(e, Driver) and isinstance(found, Joint):
+            what = what.removesuffix(RATE)
         if isinstance(found, (Body, Frame)):
             axes = found.measured(self.planar)
             if what not in axes:
@@ -411,9 +423,10 @@ class Model:
             self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
     def unit(self, text: str, e: Element) -> str:
-        """Return the unit of a coordinate."""
+        """Return the unit of a coordinate, or of the rate that a driver prescribes."""
         owner, what = self.coordinate(text, e)
-        return owner.coordinates[what].unit
+        unit: str = owner.coordinates[what].unit
+        return f"{unit}/s" if isinstance(e, Driver) and e.of_rate else unit
 
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True) -> Any:
         """Return a law as an expression of t, its inputs, sensors, tables and parameters; refuse other names.

@@ -33,7 +33,7 @@ from .messages import listing, suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
 from .shapes.mesh import Mesh, current_folder, paths_from
-from .snapshot import CATEGORIES
+from .snapshot import CATEGORIES, part_owners
 from .table import Table
 from .table_2d import Table2D
 
@@ -95,8 +95,12 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
     if model.parameters:
         lines += ["", "[parameters]"]
         lines += [f"{_key(k)} = {_value(v)}" for k, v in model.parameters.items()]
+    owners = part_owners(model)
     for category in CATEGORIES:
         for e in getattr(model, category):
+            if e.name in owners:
+                _require_unchanged(model, e, owners[e.name])
+                continue
             lines += ["", f"[[{category}]]"]
             told = category in MANY_KINDS or category in DEFAULT_KINDS
             kind = {"type": type(e).__name__} if told and type(e).__name__ != DEFAULT_KINDS.get(category) else {}
@@ -109,6 +113,12 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
     except UnicodeEncodeError as error:
         raise ModelError(f"{model.name!r} cannot be written: a text contains {error.object[error.start]!r}") from None
     return text
+
+
+def _require_unchanged(model: Model, e: Element, owner: Element) -> None:
+    """Refuse to leave out an element that no longer is what its owner gives."""
+    if e not in owner.parts(model):
+        raise ModelError(f"{e.title} differs from what {owner.title} gives, which a file cannot say; change that")
 
 
 def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
@@ -270,8 +280,9 @@ def _add_all(model: Model, entries: list[Entry], definitions: Mapping[str, Any],
             raise errors[0]  # only these can refer to one another
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
+    owned = part_owners(model)  # after their owners; copies of mechanisms are first
     for category in AFTER_OTHERS:
-        getattr(model, category).sort(key=lambda e: place.get(e.name, -1))
+        getattr(model, category).sort(key=lambda e: place.get(e.name, len(place) if e.name in owned else -1))
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:

@@ -19,7 +19,7 @@ from .controller_signals import controller_names
 from .element import Element, LawOf, Unit, fields_with
 from .event import Lock
 from .expressions import law_expression, number
-from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .force import BodyForce, CoordinateForce, Force, PathForce, TwoFrameForce, TwoPointForce
 from .joint import ORIENTATION_ANGLES, Coupling, Joint
 from .messages import listing, suggest
 from .names import curve_parts, is_curve
@@ -89,7 +89,7 @@ def _quantity_table(model: Model, name: str) -> Table:
     if e.category == "bulk":
         return body_set_quantities(axes)
     if isinstance(e, Joint):
-        return _of_joint(e, axes)
+        return _of_joint(e, axes) | ({} if e.blocks else _of_locks(model, e))
     if isinstance(e, Force):
         return _of_force(model, e, axes)
     if isinstance(e, Coupling):
@@ -146,7 +146,7 @@ def single_quantity(model: Model, name: str) -> Quantity:
 
 
 def _effort(unit: str) -> str:
-    return "N*m" if unit == "rad" else "N"
+    return "N*m" if unit.startswith("rad") else "N"
 
 
 def _unit_of(model: Model, text: str) -> str:
@@ -200,11 +200,13 @@ def _of_frame(axes: str) -> Table:
     return out
 
 
-def _of_locks(model: Model, body: Body) -> Table:
-    """Return the lock efforts of a body with coordinates that events lock, one for each."""
-    locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
-    own = dict.fromkeys(what for owner, what in map(curve_parts, locked) if owner == body.name)
-    units = {what: _effort(body.coordinates[what].unit) for what in own}
+def _of_locks(model: Model, e: Body | Joint) -> Table:
+    """Return the lock efforts of coordinates that events lock, one for each."""
+    locked = {a.what for x in model.events for a in x.do if isinstance(a, Lock)}
+    own = [
+        k for k in e.measured(model.planar) if f"{e.name}.{k}" in locked or (e.name in locked and isinstance(e, Joint))
+    ]
+    units = {what: _effort(e.coordinates[what].unit) for what in own}
     return {f"{what}_effort": Quantity(unit, curve=True, array=True) for what, unit in units.items()}
 
 
@@ -240,6 +242,8 @@ def _of_joint(e: Joint, axes: str) -> Table:
         out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
     if hasattr(e, "nearest") and "position" not in own:
         out["place"] = Quantity("m", curve=True)
+    if not e.blocks:  # what acts along its coordinates has efforts of its own
+        return out
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
 
 
@@ -258,6 +262,9 @@ def _of_wrench(axes: str) -> Table:
 def _of_force(model: Model, e: Force, axes: str) -> Table:
     units = {k: _output(model, e, unit) for k, unit in e.outputs.items()}
     out = {k: Quantity(unit, curve=True, array=True) for k, unit in units.items()}
+    if isinstance(e, PathForce):
+        inner = range(1, len(e.bodies) - 1)
+        out |= {f"load_{k + 1}": Quantity("N", curve=k in inner, array=True) for k in range(len(e.bodies))}
     if isinstance(e, (BodyForce, TwoFrameForce)):
         out = _of_wrench(axes) | ({"tz": Quantity("N*m", "torque", curve=True)} if len(axes) == 2 else {}) | out
     return out | {k: Quantity(unit, array=True) for k, unit in (("energy", "J"), ("power", "W"), ("work", "J"))}
@@ -301,11 +308,13 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
     """
     owner, what = curve_parts(name, model)
     e = model.find(owner)
-    if isinstance(e, Joint):
+    if isinstance(e, Joint) and e.blocks:
         if model.planar and what in ("fx", "fy", "force", "torque"):
             return TransmittedForce(e, SPIN if what == "torque" else WRENCH.index(what))
         return TransmittedForce(e, WRENCH.index(what)) if what in WRENCH and not model.planar else None
     if isinstance(e, CoordinateForce) and what in list(e.outputs)[2:3]:
+        if other := e.transmitted():
+            return transmitted_force(model, other)
         way = getattr(e, "direction", 1.0)  # as results tell it
         return None if isinstance(way, str) else TransmittedForce(e, 0 if e.sign * way > 0.0 else 1)
     return TransmittedForce(e, 0) if isinstance(e, Driver) and what == "effort" else None

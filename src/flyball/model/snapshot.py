@@ -158,15 +158,40 @@ def changed_copy(model: Model, parts: Mapping[str, Element | None]) -> Any:
     if not isinstance(parts, Mapping):
         raise ModelError(f"parts maps names to parts, or to None to leave one out: {{'A': None}}; not {parts!r}")
     out = model_copy(model)
+    owned: dict[str, Element | None] = {p.name: None for name in parts for p in _parts_of(model, model.find(name))}
+    new = [p for e in parts.values() for p in _parts_of(model, e)]
+    put_parts(out, owned | {p.name: p for p in new} | dict(parts))
+    out.forces = [e.bound(out) for e in out.forces]
+    out.by_name |= {e.name: e for e in out.forces}
+    for p in new:
+        if p not in getattr(out, p.category):
+            getattr(out, p.category).append(p)
+            out.by_name[p.name] = p
+    return out
+
+
+def put_parts(model: Model, parts: Mapping[str, Element | None]) -> None:
+    """Put other parts under these names into a model, or remove them (None)."""
     for category in CATEGORIES:
         if category != Initial.category:  # the names of these parts are derived from what they refer to
             kept = [parts.get(e.name, e) for e in getattr(model, category)]
-            setattr(out, category, [e for e in kept if e is not None])
+            setattr(model, category, [e for e in kept if e is not None and e.category == category])
     left = {name: parts.get(name, e) for name, e in model.by_name.items()}
-    out.by_name = {name: e for name, e in left.items() if e is not None}
-    out.forces = [e.bound(out) for e in out.forces]
-    out.by_name |= {e.name: e for e in out.forces}
-    return out
+    model.by_name = {name: e for name, e in left.items() if e is not None}
+
+
+def _parts_of(model: Model, e: Element | None) -> tuple[Element, ...]:
+    return () if e is None else e.parts(model)
+
+
+def hidden_parts(model: Model) -> set[str]:
+    """Return the names of the elements that belong to others and that pictures leave out."""
+    return {name for name, e in part_owners(model).items() if not e.shows_parts}
+
+
+def part_owners(model: Model) -> dict[str, Element]:
+    """Return the names of the elements that belong to others, with these."""
+    return {p.name: e for e in model.elements() for p in e.parts(model)}
 
 
 def refuse_changes(model: Model, what: str) -> None:

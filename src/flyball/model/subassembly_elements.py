@@ -30,6 +30,7 @@ from .names import curve_parts
 from .placement import Placement, product, rotation_of, scaled, total
 from .quantities import ENERGY, quantities
 from .quantity_images import Image, component_image, joint_image, located_image
+from .snapshot import part_owners
 
 if TYPE_CHECKING:
     from .model import Model
@@ -87,7 +88,8 @@ class Subassembly:
         self._add_parameters()
         out: list[Element] = []
         waiting: list[Element] = []
-        for e in (*self.part.by_name.values(), *self.part.initial):
+        owned = part_owners(self.part)  # these come with their owners
+        for e in (e for e in (*self.part.by_name.values(), *self.part.initial) if e.name not in owned):
             if isinstance(e, Controller):  # they may refer to one another
                 waiting.append(e)
                 continue

@@ -28,6 +28,7 @@ from ..results.motion_record import extra_turns
 from ..results.result import Result
 from ..tables.constraint_rows import declared_switches
 from ..tables.coordinate_choice import (
+    cut_joints_text,
     least_cost,
     require_rotor_coordinates,
     right_hand_side_cost,
@@ -101,7 +102,8 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     else:
         why = "as requested"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
-    return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cut_joints(c)}"
+    cut = cut_joints_text(c.structure.model, c.structure.tree_joints)
+    return replace(a, compiled=c, q=q, v=v), f"joint: {why}{cut}"
 
 
 def _evaluation_cost(s: Structure) -> float:
@@ -134,15 +136,6 @@ def refuse_unknown_coordinates(wish: str) -> None:
 
 def _size_in_words(c: CompiledMechanism) -> str:
     return f"{c.structure.nv} velocities and {len(c.structure.rows)} constraint equations"
-
-
-def _cut_joints(c: CompiledMechanism) -> str:
-    """Name the joints that close loops."""
-    s = c.structure
-    cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
-    if not cut:
-        return ""
-    return f"; loops are cut at {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
 
 
 def _sound_forest(

@@ -234,6 +234,7 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     if model.controllers:
         return _controlled_equilibrium(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
+    _refuse_speeds(a)
     begin = _search_start(a, _initial_guess(model, o))
     if has_switching_elements(model):
         _refuse_with_contact(o)
@@ -245,6 +246,17 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     return _searched_equilibrium(RestState.at(a.compiled, a.t, begin.q), o.stable)
 
 
+def _refuse_speeds(a: Assembly) -> None:
+    """Refuse drivers that prescribe a rate other than zero at the instant."""
+    a.compiled.at(a.t, a.q, a.v)
+    for row, nu in zip(a.compiled.structure.rows, a.compiled.work.rows.nu.tolist(), strict=True):
+        if row.law >= 0 and not row.holonomic and nu != 0.0:
+            raise ModelError(
+                f"{row.element.title} prescribes a rate of {nu:.6g} at t = {a.t:g} s, and an equilibrium is at rest; "
+                "give a time at which its law is 0, or simulate until the motion is steady"
+            )
+
+
 def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """Equilibrium with controllers: their states are constant. Its stability follows from the eigenvalues."""
     for name in ("stable", "preload", "turning"):
@@ -252,6 +264,7 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
     refuse_switching_with_controllers(model, "equilibrium knows", "simulate until it rests")
     a = assemble(model, t=o.t, parameters=o.parameters)
+    _refuse_speeds(a)
     guess, c = _initial_guess(model, o), a.compiled
     begin = _search_start(a, guess)
     z = (guess or begin).compiled.z[: len(c.structure.controls)].copy()

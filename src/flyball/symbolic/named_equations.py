@@ -56,10 +56,10 @@ from ..model.joint import Joint
 from ..model.model import Model
 from ..model.names import curve_parts
 from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_unknown_coordinates
-from ..tables.coordinate_choice import spanning_joints
+from ..tables.coordinate_choice import cut_joints_text, spanning_joints
 from ..tables.forest import coordinate_row
 from ..tables.structure_definition import Structure, velocity_names
-from ..tables.table_definitions import FREE, SPHERICAL, System, Work, map_arrays
+from ..tables.table_definitions import FREE, OF_RATE, SPHERICAL, System, Work, map_arrays
 from ..tables.values import Values
 
 RANK_TOLERANCE = (
@@ -96,10 +96,8 @@ def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wis
 
 
 def _description(model: Model, wish: str, tree: Sequence[str]) -> str:
-    cut = [j.name for j in model.joints if j.name not in tree]
-    more = f"; loops are cut at {', '.join(cut[:8])}" if cut else ""
-    more += f" and {len(cut) - 8} more" if len(cut) > 8 else ""
-    return f"joint: {'as requested' if wish == 'joint' else 'these make the fewest equations'}{more}"
+    why = "as requested" if wish == "joint" else "these make the fewest equations"
+    return f"joint: {why}{cut_joints_text(model, tree)}"
 
 
 def _is_regular(c: CompiledMechanism, wish: str) -> bool:
@@ -291,7 +289,7 @@ def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
         if what == "effort"
         else (r"\lambda", what.removeprefix("lam").removeprefix("_").removeprefix("n"))
     )
-    unit = ("N*m" if s.model.unit(e.coordinate, e) == "rad" else "N") if isinstance(e, Driver) else ""
+    unit = ("N*m" if s.model.unit(e.coordinate, e).startswith("rad") else "N") if isinstance(e, Driver) else ""
     return Symbol(
         name, "multiplier", _indexed(letter, (index + "," if index else "") + latex_part_name(e.name)), unit, e.name
     )
@@ -331,7 +329,7 @@ def with_whole_turns(x: Values, S: System) -> tuple[System, list[int]]:
             hint[k] = len(s.states) + len(more)
             parameters[k, 0] = 1.0
             more.append(k)
-    rows = S.rows._replace(wrapped=np.zeros_like(S.rows.wrapped))
+    rows = S.rows._replace(wrapped=np.where(S.rows.wrapped == OF_RATE, OF_RATE, 0))
     return S._replace(rows=rows, terms=S.terms._replace(hint=hint), term_parameters=parameters), more
 
 

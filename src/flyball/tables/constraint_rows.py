@@ -43,6 +43,7 @@ from .table_definitions import (
     COUPLED,
     EITHER,
     FALLING,
+    OF_RATE,
     RISING,
     SCHUR,
     TERM_KINDS,
@@ -109,6 +110,8 @@ def _add_coupling(s: Structure, e: Coupling) -> None:
 
 def _add_driver(s: Structure, driver: Driver) -> None:
     law = s.model.law(driver.law, LawOf(s.model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
+    if driver.of_rate and s.positions:
+        return
     at = s.law(law, (), driver, derivatives=True)
     sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
     link = _prescribed_row(s, driver)
@@ -118,7 +121,8 @@ def _add_driver(s: Structure, driver: Driver) -> None:
         tree.law[link], tree.work[link] = at, s.state(f"{driver.name}.work")
         return
     row = _add_coordinate_row(s, driver, driver.coordinate, at)
-    row.sensors = sensors
+    row.sensors = () if driver.of_rate else sensors
+    row.holonomic = not driver.of_rate
     if not s.far:
         row.work = s.state(f"{driver.name}.work")
 
@@ -126,7 +130,8 @@ def _add_driver(s: Structure, driver: Driver) -> None:
 def _prescribed_row(s: Structure, driver: Driver) -> int | None:
     """Row of the body table whose one coordinate a driver prescribes; None for a coordinate that needs a row."""
     owner, what = s.model.coordinate(driver.coordinate, driver)
-    if not isinstance(owner, Joint) or sum(d.coordinate == driver.coordinate for d in s.model.drivers) > 1:
+    alone = sum(d.coordinate == driver.coordinate for d in s.model.drivers) == 1
+    if driver.of_rate or not isinstance(owner, Joint) or not alone:
         return None
     return coordinate_row(s, owner.name, what)
 
@@ -230,7 +235,9 @@ def sort_terms(s: Structure) -> None:
     for k, name in enumerate(s.prescribed):
         s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
     s.tables["frame_body"] = np.array([f.body for f in s.frames], np.int64)
-    s.tables["rows"] = integer_table(Rows, [(r.law, r.wrap, r.work) for r in s.rows])
+    s.tables["rows"] = integer_table(
+        Rows, [(r.law, r.wrap if r.holonomic or r.law < 0 else OF_RATE, r.work) for r in s.rows]
+    )
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_body"] < 0).sum())
     absolute = not s.tree_joints and not s.coupled

@@ -138,6 +138,13 @@ def _grow(near: dict, worth: dict[str, int], root: str, reached: set[str], chose
             offer(other, depth + 1)
 
 
+def cut_joints_text(model: Model, tree: Collection[str]) -> str:
+    """Return '; loops are cut at A, B' with the joints whose rows close loops; empty if there are none."""
+    cut = [j.name for j in model.joints if j.name not in tree and j.rows(model.planar)]
+    more = f" and {len(cut) - 8} more" if len(cut) > 8 else ""
+    return f"; loops are cut at {', '.join(cut[:8])}{more}" if cut else ""
+
+
 BODY_COST, LINK_COST, TERM_COST, ENTRY_COST, ARTICULATED_COST = 315.0, 112.0, 40.0, 28.0, 12.0
 FACTOR_COST = 1.0  # a product of the factorisation: matters only where a forest's matrix is dense and large
 

@@ -125,11 +125,15 @@ class Segments(NamedTuple):
     entry: Int1  # first in `Work.G`
 
 
+OF_RATE = 2
+"""Value of `Rows.wrapped`: the law prescribes the rate of the quantity, which has no value."""
+
+
 class Rows(NamedTuple):
     """Constraint rows [(nr,)]."""
 
     law: Int1  # law that its quantity follows; -1: 0
-    wrapped: Int1  # whether it is an angle, compared up to whole turns
+    wrapped: Int1  # 1 if it is an angle, compared up to whole turns; OF_RATE if the law is that of its rate
     work: Int1  # state of its work; -1: none
 
 

@@ -16,6 +16,7 @@ from ..model.controller import Controller
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from ..model.names import curve_parts
+from ..model.snapshot import hidden_parts
 from .body_shapes import BodyShapes
 from .comparison_tables import difference_tables, measurement_table
 from .event_marks import event_marks
@@ -216,11 +217,13 @@ def record_motion(
     members = _member_count(result)
     places = AttachedFrames(result)
     looks = BodyShapes(result, places)
+    hidden = hidden_parts(result.model)
     drawn = list(_symbols_and_lines(result, places, looks, every))
     channels = _recorded_channels(result, every) if curves else ()
     bodies = tuple(
         RecordedBody(b.name, looks.shapes(b.name), p, q, b.color)
         for b, (p, q) in zip(result.model.bodies, body_poses(result, every), strict=True)
+        if b.name not in hidden
     )
     joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
     sets = recorded_sets(result, every)
@@ -313,7 +316,8 @@ def _symbols_and_lines(
     """Return symbols of joints and couplings; lines of springs, dampers, ropes and links."""
     m = result.model
     wheels: list[GearWheel] = []
-    for e in (*m.joints, *m.couplings):
+    hidden = hidden_parts(m)
+    for e in (x for x in (*m.joints, *m.couplings) if x.name not in hidden):
         for drawn in element_symbols(e, places, every, wheels):
             worn = looks.fit_symbol(drawn) if isinstance(drawn, RecordedJoint) else drawn
             if worn is not None:
@@ -335,8 +339,8 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
     numbers = places.result.values.numbers[e.name]
     if len(ends) > 1:
         points = [places.track(end)[0] for end in ends]
-        rest = _free_length(numbers, points)[every] if e.single == "rope" else None  # others are never slack
-        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=rest)
+        rest = _free_length(e, places.result, points) if e.single == "rope" else None  # others are never slack
+        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=None if rest is None else rest[every])
     pair = places.ends(e)
     if pair is None or e.symbol not in ("spring", "damper"):
         return None
@@ -344,8 +348,13 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
     return RecordedLine(e.name, kind, tuple(places.track(end)[0][every] for end in pair))
 
 
-def _free_length(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
+def _free_length(e: Any, result: Result, points: list[np.ndarray]) -> np.ndarray:
     """The free length of a rope: as given, else that at the first time, in place of the reference configuration."""
+    numbers = result.values.numbers[e.name]
+    if e.transmitted():  # wound up or paid out: its path, and what is slack
+        limit = e.transmitted().partition(".")[0]
+        slack: np.ndarray = result.values.numbers[limit].upper - result[limit].value
+        return result[e.name].length + slack
     if getattr(numbers, "length", None) is not None:
         return np.full(len(points[0]), float(numbers.length))
     steps = [b[:1] - a[:1] for a, b in pairwise(points)]

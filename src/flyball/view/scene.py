@@ -13,6 +13,7 @@ from ..model.element import resolve
 from ..model.force import BodyForce, CoordinateForce
 from ..model.geometry import matrix_to_quaternion
 from ..model.shapes import Plane
+from ..model.snapshot import hidden_parts
 from .body_shapes import shape_from_solid
 from .figures import evenly_chosen
 from .recording import RecordedArrow, RecordedBody, RecordedContacts, RecordedSet, Shape, half_extent
@@ -202,12 +203,14 @@ ArrowData = tuple[str, str, str, AttachedFrame, np.ndarray]
 def _all_arrows(result: Result, places: AttachedFrames, most: int) -> Iterator[ArrowData]:
     for joint in evenly_chosen(result.model.joints, most):
         M = places.end(joint.name, "M")
-        if M is not None:
+        if M is not None and joint.blocks:
             force, torque = result[joint.name].reaction()
             yield from _force_and_moment(joint.name, "reaction", M, force, torque)
-    for e in evenly_chosen([*result.model.forces, *result.model.limits], most):
+    hidden = hidden_parts(result.model)
+    forces = [e for e in (*result.model.forces, *result.model.limits) if e.name not in hidden]
+    for e in evenly_chosen(forces, most):
         yield from _element_arrows(result, places, e)
-    for driver in result.model.drivers:
+    for driver in (d for d in result.model.drivers if d.name not in hidden):
         yield from _coordinate_arrow(result, places, driver.name, driver.coordinate, result[driver.name].effort)
 
 

@@ -7,7 +7,7 @@ of gear wheels follow from the distance of their axes; teeth mesh in the referen
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -303,8 +303,10 @@ def is_rotational(owner: Any, what: str) -> bool:
 
 def coordinate_axis(owner: Any, what: str, base: AttachedFrame, places: AttachedFrames) -> np.ndarray:
     """Return the direction of a coordinate, or its axis, in the world over time, (n, 3)."""
-    if owner.coordinates[what].singular:  # the torque of a unit effort
-        return np.stack(unit_effort_wrench(places.result, owner, what)[1], axis=1)
+    c = owner.coordinates[what]
+    if c.singular or (not c.row.axes and not is_rotational(owner, what)):  # torque or force of a unit effort
+        wrench = unit_effort_wrench(places.result, owner, what)
+        return np.stack(wrench[is_rotational(owner, what)], axis=1)
     k = "xyz".index(what) if what in ("x", "y", "z") else 2
     if not isinstance(owner, Joint):
         return np.tile(np.eye(3)[k], (len(places.result.t), 1))
@@ -379,7 +381,10 @@ def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: l
         return
     F, M = ends
     numbers = places.result.values.numbers[e.name]
-    if kind == "link":
+    if kind == "linear_actuator":
+        if e.barrel is None:  # these have shapes
+            yield replace(_link_line(e, places, every), kind="damper")
+    elif kind == "link":
         yield _link_line(e, places, every)
     elif (
         kind == "universal"

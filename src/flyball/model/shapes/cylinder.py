@@ -28,6 +28,9 @@ class Cylinder(Solid):
     length: Length
 
     symmetric: ClassVar[str] = "xyz"
+    hints: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("at", "force", "body_i"), "a Cylinder is a shape; a hydraulic cylinder between two points is a LinearActuator"
+    )
 
     def check(self, n: SimpleNamespace) -> None:
         """Radius and length greater than zero."""

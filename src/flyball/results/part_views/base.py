@@ -112,6 +112,12 @@ class PartView(NamedQuantities):
         """All quantities of the part, by name."""
         return quantities(self._x.structure.model, self.element.name)
 
+    def lock_effort(self, what: str) -> np.ndarray:
+        """Return the force [N] or torque [N m] along a coordinate of the part while it is locked, else 0."""
+        label = f"{self.element.name}.{what}"
+        rows = [w.row for w in self._result.values.structure.switches if w.switch.label == label]
+        return self._result.multipliers[:, rows[0]] if rows else self._result.motions.zeros()
+
     def __repr__(self) -> str:
         return f"<{self.title} over {len(self._result.t)} times: {', '.join(self.names)}>"
 

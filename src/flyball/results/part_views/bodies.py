@@ -61,7 +61,7 @@ class FrameView(PartView):
     def _found(self, name: str) -> np.ndarray:
         """Return the effort of a locked coordinate, an angle of orientation, or a body's contact force."""
         if name.endswith("_effort"):
-            return self._effort(f"{self.element.name}.{name.removesuffix('_effort')}")
+            return self.lock_effort(name.removesuffix("_effort"))
         if (angle := name.removesuffix("_rate")) in ORIENTATION_ANGLES:
             return self._orientation_angle(angle)[int(angle != name)]
         found, n = self._result.contacts, 2 if self._result.planar else 3
@@ -74,11 +74,6 @@ class FrameView(PartView):
         at = self._x.structure.state_at.get(f"{self.element.name}.{what}")
         turns = None if at is None else self._result.states[:, at]
         return measured_coordinate(self._result.motions, self.element, what, turns)[:2]
-
-    def _effort(self, coordinate: str) -> np.ndarray:
-        """Return the force [N] or torque [N m] along a coordinate while it is locked, else 0."""
-        rows = [w.row for w in self._result.values.structure.switches if w.switch.label == coordinate]
-        return self._result.multipliers[:, rows[0]] if rows else self._result.motions.zeros()
 
     @property
     def rotation(self) -> np.ndarray:

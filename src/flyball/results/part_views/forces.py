@@ -107,7 +107,7 @@ class ForceView(PartView):
             m = s.measured.get(e.coordinate_text() or f"{e.name}:length")
             nothing = self._result.motions.zeros() + np.nan
             x, rate = (nothing, nothing) if m is None else self._result.measured.quantity(m)
-            effort = nothing
+            effort = self._result.channel(e.transmitted())[1] if e.transmitted() else nothing
         side = sign(effort) * (effort != 0.0)
         stretches = self._result.phases
         if own and stretches is not None:
@@ -211,6 +211,8 @@ class ForceView(PartView):
         """Work done on the bodies since the start [J]: integrated with the motion, or the decrease of stored energy."""
         name = f"{self.element.name}.work"
         states = self._x.structure.state_at
+        if parts := [p for p in self.element.parts(self._x.structure.model) if f"{p.name}.work" in states]:
+            return sum((self._result[p.name].work for p in parts), self._result.motions.zeros())
         if name in states:
             return self._result.states[:, states[name]]
         return stored_reference(self._result, self.element.name) - self.energy
@@ -227,6 +229,9 @@ class ForceView(PartView):
         For a force on a body, or between two frames: force and torque.
         """
         outputs = list(self.element.outputs)
+        if name.startswith("load_"):
+            pull = self.pulls[int(name.removeprefix("load_")) - 1][1]
+            return np.sqrt((pull * pull).sum(axis=1))
         if name not in outputs:
             return self._whole[name == "torque"]
         k = outputs.index(name)

@@ -68,6 +68,8 @@ class JointView(PartView):
         """Return a coordinate by name, or its derivatives with ``_rate`` and ``_acceleration`` appended."""
         if name == "place":
             return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
+        if name.endswith("_effort"):
+            return self.lock_effort(name.removesuffix("_effort"))
         k = next((k for k, ending in enumerate(DERIVATIVE_ENDINGS) if k and name.endswith(ending)), 0)
         what = name.removesuffix(DERIVATIVE_ENDINGS[k])
         if (key := (what, k == 2)) not in self._known:
@@ -76,6 +78,8 @@ class JointView(PartView):
 
     def _wrench(self) -> Wrench:
         """Return the force on body_j at M's origin and the torque about it, world components."""
+        if "force" not in self.names:
+            raise AttributeError(self._unknown("force"))
         return self._result.reactions.of(self.element.name)
 
     def reaction(self, *, axes: str = "world", on: str | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -178,7 +178,7 @@ PRINTED_ZERO = 1e-12  # m or rad: printed as 0
 def switch_units(s: Structure) -> list[str]:
     """Return the unit of every switch's quantity: m or rad."""
     rows = len(s.rows)
-    measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured}
+    measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured and t.index == 0}
     return ["m" if measures.get(x.measured) == "m" else "rad" for x in s.switches]
 
 
