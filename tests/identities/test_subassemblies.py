@@ -1,12 +1,16 @@
 """The motion of a mechanism's copy that is moved, turned or reflected is its own motion, moved, turned or reflected."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.model.element import resolve
 from flyball.model.placement import Placement, rotation_of
 from tests.contract.test_everything import everything
 from tests.contract.zoo import CASES, joined
+from tests.model.test_shapes import SAMPLES
 from tests.robust.families import made
 
 AT, TURN = (0.7, -0.4, 1.1), (0.9, -0.5, 1.4)
@@ -84,3 +88,54 @@ def test_random_mechanisms(family, seed, how):
         assert "cannot be" in str(error) or (m.planar and how == "mirrored z")
         return
     assert_images(m, whole, place, 0.05)
+
+
+def in_contact() -> fb.Mechanism:
+    """Solids without symmetry on a floor of unequal friction that moves like a belt, and a set of bodies."""
+    m = fb.Mechanism("scene", gravity=(0, 0, -9.81))
+    m.add(fb.Material("wood", friction=(0.5, 0.1), grain=(1, 0.3, 0), surface_velocity=(0.1, 0.2, 0)))
+    m.add(fb.Material("stone", friction=0.4, restitution=0.2))
+    box = fb.Box(edges=(1, 1, 0.1), position=(2, 0.5, 0.1))
+    m.add(fb.Ground("floor", shape=(fb.Plane(normal=(0.1, 0.2, 1)), box), material="wood"))
+    hull = fb.Hull(vertices=[(0, 0, 0), (0.3, 0, 0), (0, 0.2, 0), (0.05, 0.05, 0.25)])
+    for k, shape in enumerate((
+        fb.Cone(radius=0.1, height=0.3, orientation=(0.3, 0.4, 0)), hull,
+        fb.Prism(outline=[(0, 0), (0.3, 0), (0.1, 0.2)], thickness=0.05),
+    )):  # fmt: skip
+        turning = {"orientation": (0.2, 0.5, 0.1), "angular_velocity": (3, -2, 1), "velocity": (1, 0.5, 0)}
+        m.add(fb.Body(f"b{k}", density=500, shape=shape, position=(k - 1, 0, 0.5), material="stone", **turning))
+    m.add(
+        fb.Bodies(
+            "balls", shape=fb.Hemisphere(radius=0.1), density=1000, position=[(0, 1, 0.6), (0.5, 1, 0.7)],
+            orientation=(0.9, 0.1, 0.2, 0.3), angular_velocity=(1, 2, 0), velocity=(0.3, 0, 0), material="stone",
+        ),
+        fb.Contact("touch"),
+    )  # fmt: skip
+    return m
+
+
+@pytest.mark.parametrize("how", PLACED)
+def test_bodies_in_contact(how):
+    m = in_contact()
+    whole, place = placed(m, PLACED[how])
+    runs = [x.simulate(0.4, method="impulse", outputs=5) for x in (m, whole)]
+    assert all(runs[0][f"b{k}"].velocity[-1, 2] > -0.9 * 9.81 * 0.4 for k in range(3))  # none falls freely
+    for name in ("b0", "b1", "b2", "balls"):
+        wanted = np.array(runs[0][name].position) @ place.polar.T + np.array(place.translation)
+        assert np.abs(runs[1][f"copy.{name}"].position - wanted).max() < 1e-9, name
+
+
+@pytest.mark.parametrize("axis", "xyz")
+@pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
+def test_every_shape(shape, axis):
+    """The mirror image of a solid, turned on its body, has the mirror images of its surface, centre and inertia."""
+    if not hasattr(shape, "start"):
+        shape = replace(shape, position=(0.3, -0.1, 0.2), orientation=(0.4, -0.7, 1.1))
+    image, S = shape.mirrored(axis), Placement(mirror=axis).reflection
+    old, new = (resolve(x, {}) for x in (shape, image))
+    (c, J), (d, K) = shape.placed(old), image.placed(new)
+    assert np.abs(S @ c - d).max() < 1e-12
+    assert np.abs(S @ J @ S - K).max() < 1e-12 * np.abs(J).max()
+    v, w = shape.mesh(old)[0] @ S, image.mesh(new)[0]
+    for d in np.random.default_rng(3).normal(size=(20, 3)):  # both extend as far, but for the facets of round sides
+        assert (v @ d).max() == pytest.approx((w @ d).max(), abs=0.02 * np.linalg.norm(d) * np.ptp(v))
