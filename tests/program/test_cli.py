@@ -238,6 +238,18 @@ def test_view_writes_the_page_and_opens_it(here: Path, monkeypatch: pytest.Monke
     assert opened == [(here / "r.html").resolve().as_uri()]
 
 
+def test_results_in_other_formats_and_spectra(here: Path) -> None:
+    said = Said("run", "crank.toml", "--t-end", 0.5, "--no-animation", "--spectrum", "C.angle", "--save", "a.svg")
+    assert said.code == 0, said.err
+    assert "spectrum of C.angle: mean" in said.out
+    assert Path("crank-result/spectrum.png").is_file()
+    assert Said("convert", "crank-result/result.nc", "a.mat", "a.png").out == "a.mat\na.png\n"
+    assert all(Path(name).is_file() for name in ("a.svg", "a.mat", "a.png"))
+    said = Said("convert", "crank-result/result.nc", "a.xlsx")
+    assert said.code == 2
+    assert "'.xlsx' is not known here" in said.err
+
+
 def test_view_compares_results_and_measured_curves(here: Path) -> None:
     Path("other").mkdir()
     r = slider_crank()

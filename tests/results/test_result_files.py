@@ -15,11 +15,14 @@ import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
+from scipy.io import loadmat
 
 import flyball as fb
 from flyball.results import files
-from flyball.results.files import data_checksum, read_group, text_type, write_table
+from flyball.results.files import data_checksum, read_group, text_type
 from flyball.results.result import Result
+from flyball.results.result_tables import write_table
 from tests.results.made_up import slider_crank
 
 
@@ -121,6 +124,41 @@ def test_numbers_of_a_table_are_exact(tmp_path: Path) -> None:
         header, *rows = csv.reader(file)
     assert header == ["a, b", "c"]
     np.testing.assert_array_equal(np.array(rows, float), np.stack([numbers, 3.0 * numbers], axis=1))
+
+
+def test_tables_of_other_programs(result: Result, tmp_path: Path) -> None:
+    result.save(tmp_path / "r.mat")
+    mat = loadmat(tmp_path / "r.mat", simplify_cells=True)
+    assert (mat["slider"]["x"] == result["slider.x"]).all()
+    assert mat["units"]["slider"]["x"] == "m"
+    assert (mat["t"] == result.t).all()
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: no Parquet file can be written")
+    result.save(tmp_path / "r.parquet")
+    table = parquet.read_table(tmp_path / "r.parquet")
+    assert table.column_names == ["time", *result.channels()]
+    assert table.schema.field("slider.x").metadata == {b"unit": b"m"}
+    assert (table["slider.x"].to_numpy() == result["slider.x"]).all()
+
+
+def test_names_that_matlab_does_not_have(tmp_path: Path) -> None:
+    m = fb.Mechanism("two", planar=True)
+    for name in ("left wheel", "left_wheel", "2nd"):
+        m.add(fb.Body(name, mass=1, inertia=1))
+    m.simulate(0.1, outputs=3).save(tmp_path / "r.mat")
+    assert {"left_wheel", "left_wheel_2", "x2nd"} <= set(loadmat(tmp_path / "r.mat"))
+
+
+def test_pictures_of_the_scene(result: Result, tmp_path: Path) -> None:
+    result.save(tmp_path / "r.svg")
+    assert "<svg" in (tmp_path / "r.svg").read_text(encoding="utf-8")
+    result.save(tmp_path / "r.png")
+    with Image.open(tmp_path / "r.png") as picture:
+        assert picture.width == 1280
+        assert len(np.unique(np.array(picture).reshape(-1, 3), axis=0)) > 5
+    with pytest.raises(
+        fb.ModelError, match=r"'\.xlsx' is not known here; it must be \.nc .* \.parquet or \.mat .* \.svg"
+    ):
+        result.save(tmp_path / "r.xlsx")
 
 
 def test_what_is_no_result_is_refused(result: Result, tmp_path: Path) -> None:

@@ -6,9 +6,11 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from flyball.view.page import animation_page, notebook_iframe
 from flyball.view.recording import Recording
@@ -133,6 +135,30 @@ def test_dark_bodies_have_an_edge_on_dark_ground(opened: Open) -> None:
         tab.settle()
         calls[theme] = tab.evaluate("flyball.drawn().calls")
     assert calls["dark"] > calls["light"]
+
+
+def test_picture_plots_and_animation_are_saved(opened: Open, tmp_path: Path) -> None:
+    tab = opened(animation_page(dataclasses.replace(planar("a swing"), speed=4.0)))
+    tab.click(".show")
+    files = {}
+    for what, ending in (("png", "png"), ("svg", "svg"), ("webm", "webm")):
+        with tab.expect_download() as download:
+            tab.click(f"[name=save-{what}]")
+        assert download.value.suggested_filename == f"a-swing.{ending}"
+        download.value.save_as(tmp_path / f"a.{ending}")
+        files[what] = (tmp_path / f"a.{ending}").read_bytes()
+    with Image.open(tmp_path / "a.png") as picture:
+        assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 20
+    drawing = ElementTree.fromstring(files["svg"])
+    space = "{http://www.w3.org/2000/svg}"
+    names = [e.text for e in drawing.iter(f"{space}tspan")]
+    assert names == tab.locator(".plot .curve .name").all_text_contents()
+    assert all(e.get("d", "").count("L") > 50 for e in drawing.iter(f"{space}path"))
+    assert files["webm"][:4] == b"\x1a\x45\xdf\xa3"  # EBML
+    assert len(files["webm"]) > 2000
+    assert tab.time == pytest.approx(4.0)
+    assert tab.locator("[name=save-webm]").inner_text() == "Animation (WebM)"
+    assert tab.errors == []
 
 
 def test_address_gives_time_and_theme(opened: Open) -> None:

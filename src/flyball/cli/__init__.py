@@ -21,7 +21,7 @@ from . import view as view
 from .application import app
 
 COMMANDS = (
-    *("run", "check", "view", "live", "new", "fmt", "schema", "compare", "kinematics", "inverse-dynamics"),
+    *("run", "check", "view", "convert", "live", "new", "fmt", "schema", "compare", "kinematics", "inverse-dynamics"),
     *("mobility", "singularities", "equilibrium", "equilibria", "linearize", "modes", "root-locus"),
     *("study", "optimize", "sensitivity", "equations", "export", "compile"),
 )

@@ -45,6 +45,14 @@ def run(
         bool | None, typer.Option(help="Write pictures (PNG); by default if there is no report, which has all curves.")
     ] = None,
     no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
+    spectrum: Annotated[
+        list[str] | None,
+        typer.Option(help='Curve or sensor, such as "A.rate", of which spectrum.png is drawn; may be repeated.'),
+    ] = None,
+    save: Annotated[
+        list[Path] | None,
+        typer.Option(help="Write one more file, by its ending, as flyball convert does; may be repeated."),
+    ] = None,
     report: Annotated[
         bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
     ] = None,
@@ -65,6 +73,14 @@ def run(
     folder = out if out is not None else Path(f"{request.source.stem}-result")
     wanted = [name for name, asked_for in pages.items() if asked_for]
     files, notes = _write_run_files(result, folder, not reported if plots is None else plots, wanted)
+    for path in save or ():
+        result.save(path)
+        files.append(path)
+    if spectrum and len(result.t):
+        found = result.spectrum(*spectrum)
+        found.plot(folder / "spectrum.png")
+        files.append(folder / "spectrum.png")
+        notes += [f"spectrum of {label}: {text}" for label, text in found.lines() if label in found.names]
     _print_summary(result, error, files, notes, request.as_json, talk)
 
 

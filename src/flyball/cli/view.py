@@ -45,6 +45,28 @@ def view(
             webbrowser.open(page.resolve().as_uri())
 
 
+@app.command(short_help="Write a result (.nc) in other formats.")
+def convert(
+    result: Annotated[Path, typer.Argument(help="A result (.nc).")],
+    files: Annotated[list[Path], typer.Argument(help="Files to write, by their endings.", metavar="FILE")],
+    as_json: AsJson = False,
+) -> None:
+    """Write a result in other formats, by the endings of the files.
+
+    Tables .csv, .parquet, .mat; videos .gif, .mp4, .webm; the scene .glb, .png, .svg; the page .html.
+    """
+    with report_errors(as_json):
+        from ..mechanism import load_result
+
+        found = load_result(result)
+        for file in files:
+            found.save(file)
+            if not as_json:
+                typer.echo(str(file))
+        if as_json:
+            print_json({"files": [str(f) for f in files]})
+
+
 def _page_file(files: Sequence[Path], measured: Path | None) -> Path:
     """Return the animation page of files: the file itself, or a page written beside the first result.
 

@@ -14,10 +14,13 @@ from ..errors import ModelError, cannot_write
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
 PICTURE, DESCRIPTION, SCENE, SCHEMA = (".png", ".svg", ".pdf"), (".toml",), (".glb",), (".json",)
 VIDEO = (".gif", ".mp4", ".webm")
+PARQUET, MATLAB, SCENE_PICTURE = (".parquet",), (".mat",), (".png", ".svg")
 ROBOT = (".urdf", ".xml", ".mjcf")
 OTHER_METHODS = {
     SCENE: "save",
     VIDEO: "save",
+    PARQUET: "save",
+    MATLAB: "save",
     RESULT: "save",
     TABLE: "to_csv",
     PAGE: "to_html",

@@ -12,20 +12,19 @@ written (an incomplete copy, a failing disk) is refused.
 from __future__ import annotations
 
 import copy
-import csv
 import hashlib
 import io
 import json
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..model.output_files import TABLE, replacing_file, write_file
+from ..model.output_files import write_file
 from ..model.quantities import ENERGY, quantities
 from ..tables.values import Values, values
 from .contacts import CONTACT_COLUMNS, ContactBodies, Contacts, Convergence
@@ -35,17 +34,14 @@ from .part_views.bodies import SET_MOTION_ARRAYS as OVER_TIME
 from .part_views.forces import ForceView
 from .part_views.joints import JointView
 from .reactions import EventImpulses
-from .wording import with_unit
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
     from .result import Result
 
 
 TEXTS_VARIABLE, NUMBERS_VARIABLE = "texts", "numbers"
-ROWS_AT_ONCE = 512  # rows of a table whose numbers are Python objects at the same time
 MAX_CONCATENATED = 1 << 20  # size of arrays that are combined before writing
 
 
@@ -303,46 +299,6 @@ def _file_attributes(result: Result) -> dict[str, str]:
     from .. import __version__
 
     return {"title": result.model.name, "source": f"flyball {__version__}", "status": result.health.message}
-
-
-def to_dataframe(result: Result) -> pandas.DataFrame:
-    """Return all curves as columns ``"slider.x"``; time [s] as index; units in ``attrs["units"]``."""
-    import pandas as pd
-
-    channels = result.channels()
-    frame = pd.DataFrame({k: v for k, (_, v) in channels.items()}, index=pd.Index(result.t, name=TIME_LABEL))
-    frame.attrs["units"] = {k: unit for k, (unit, _) in channels.items()}
-    return frame
-
-
-def to_csv(result: Result, path: str | os.PathLike) -> None:
-    """Write all curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
-    channels = result.channels()
-    header = [f"{TIME_LABEL} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
-    write_table(path, header, [result.t, *(v for _, v in channels.values())])
-
-
-def write_table(
-    path: str | os.PathLike, header: Sequence[str], columns: Sequence[np.ndarray], missing: str = "nan"
-) -> None:
-    """Write columns of numbers as a table (.csv), each with the fewest digits that are exact.
-
-    ``missing`` is written for nan.
-    """
-    with replacing_file(path, TABLE) as file:
-        line = io.StringIO()
-        csv.writer(line).writerow(header)
-        file.write(line.getvalue().encode())
-        for k in range(0, len(columns[0]), ROWS_AT_ONCE):
-            rows = np.stack([x[k : k + ROWS_AT_ONCE] for x in columns], axis=1)
-            file.write(_csv_rows(rows, missing.encode()))
-
-
-def _csv_rows(numbers: np.ndarray, missing: bytes) -> bytes:
-    from pydantic_core import to_json
-
-    text = to_json(numbers.tolist(), inf_nan_mode="constants")[2:-2].replace(b"],[", b"\r\n") + b"\r\n"
-    return text if np.isfinite(numbers).all() else text.replace(b"NaN", missing).replace(b"Infinity", b"inf")
 
 
 def save(result: Result, path: str | os.PathLike, *, with_labelled: bool = True) -> None:

@@ -13,7 +13,7 @@ from ..errors import ModelError
 from ..math.vec import cross, sub
 from ..model.joint import Coupling, Joint
 from ..model.model import listing, suggest
-from .files import write_table
+from .result_tables import write_table
 from .wording import number_text, range_text, with_unit
 
 if TYPE_CHECKING:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,18 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.names import curve_parts
-from ..model.output_files import PAGE, RESULT, SCENE, TABLE, VIDEO, file_extension, write_file
+from ..model.output_files import (
+    MATLAB,
+    PAGE,
+    PARQUET,
+    RESULT,
+    SCENE,
+    SCENE_PICTURE,
+    TABLE,
+    VIDEO,
+    file_extension,
+    write_file,
+)
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
 from ..tables.values import Values, values
 from .contacts import Contacts, concatenate_contacts
@@ -48,6 +60,12 @@ if TYPE_CHECKING:
     from .measurements import MeasurementComparison
     from .momentum import Momentum
     from .spectrum import Spectrum
+
+
+def _write_scene(result: Result, path: str | os.PathLike) -> None:
+    from ..view.video import write_scene
+
+    write_scene(result, path)
 
 
 class OwnedLock:
@@ -390,43 +408,42 @@ class Result:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """All curves as a data frame, time as index, units in ``attrs["units"]``."""
-        from .files import to_dataframe
+        from .result_tables import to_dataframe
 
         return to_dataframe(self)
 
     def to_csv(self, path: str | os.PathLike) -> None:
         """All curves as a table; the header holds names and units."""
-        from .files import to_csv
+        from .result_tables import to_csv
 
         to_csv(self, path)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything, the model included, to one NetCDF file (.nc); ``flyball.load_result`` reads it back.
 
-        The extension selects the format: .csv and .html are written as by `to_csv` or `to_html`, .glb is the animated
-        scene in glTF, which slides, Blender and web viewers open; .gif, .mp4 and .webm are videos as by `to_video`.
+        The extension selects the format. Tables of all curves are .csv, .parquet (with the package pyarrow) and .mat,
+        for MATLAB; .html is the page of `to_html`. The animated scene in glTF is .glb, which slides, Blender and web
+        viewers open. Videos as by `to_video` are .gif, .mp4 and .webm; .png and .svg show the scene at the first time.
 
         Raises
         ------
         ModelError
             If the extension is unknown, or the file cannot be written.
         """
+        from . import result_tables
         from .files import save
 
-        found = file_extension(path, (*RESULT, *TABLE, *PAGE, *SCENE, *VIDEO))
-        if found in TABLE:
-            self.to_csv(path)
-        elif found in PAGE:
-            self.to_html(path)
-        elif found in VIDEO:
-            self.to_video(path)
-        elif found in SCENE:
-            from ..view.animation import record_motion
-            from ..view.gltf import gltf_scene
-
-            write_file(path, gltf_scene(record_motion(self, curves=False, with_notes=False)), SCENE)
-        else:
-            save(self, path)
+        writers: dict[tuple[str, ...], Callable[..., None]] = {
+            RESULT: partial(save, self),
+            TABLE: self.to_csv,
+            PARQUET: partial(result_tables.to_parquet, self),
+            MATLAB: partial(result_tables.to_mat, self),
+            PAGE: self.to_html,
+            VIDEO: self.to_video,
+            (*SCENE, *SCENE_PICTURE): partial(_write_scene, self),
+        }
+        found = file_extension(path, tuple(itertools.chain(*writers)))
+        next((w for endings, w in writers.items() if found in endings), writers[RESULT])(path)
 
     def plot(self, *names: str, path: str | os.PathLike | None = None) -> Any:
         """Plot curves over time; returns the Matplotlib figure, or writes it to ``path``."""

@@ -321,6 +321,7 @@ PLAYER_MODULES = (
     "overlay",
     "variants",
     "compared",
+    "save",
     "main",
 )
 LIVE_MODULES = ("grip", "transport", "live")

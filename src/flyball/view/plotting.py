@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -166,26 +166,27 @@ def panels_over_time(
     drawing = new_figure(0.9 + sum(heights))
     axes = drawing.subplots(len(parts), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for ax, panel in zip(axes, parts, strict=True):
-        _plot_panel(ax, t, panel)
+        plot_panel(ax, t, panel)
     axes[-1].set_xlabel("time [s]")
     draw_marks(list(axes), marks)
     return drawing
 
 
-def _plot_panel(ax: Axes, t: np.ndarray, panel: Panel) -> None:
-    """Curves of one unit, with a legend beside them; a curve that lies on another one is dashed."""
+def plot_panel(ax: Axes, x: np.ndarray, panel: Panel, legend: Mapping[str, Any] = LEGEND_BESIDE) -> None:
+    """Draw curves of one unit over x with a legend; a curve that lies on another one is dashed."""
     values = [c.values for c in panel.curves]
     for k, (c, under) in enumerate(zip(panel.curves, hidden_counts(values), strict=True)):
         style = DASH_STYLES[max(under, k // len(PALETTE)) % len(DASH_STYLES)]
-        single = "o" if len(t) == 1 else None
-        ax.plot(t, c.values, label=c.name, linestyle=style, marker=single)
+        single = "o" if len(x) == 1 else None
+        ax.plot(x, c.values, label=c.name, linestyle=style, marker=single)
     _limit_zoom(ax, values)
     ax.set_ylabel(axis_label(panel.label, panel.unit))
     if panel.note:
         ax.set_title(panel.note)
-    if len(t) > 1:
+    if len(x) > 1:
         ax.margins(x=0.0)
-    ax.legend(**LEGEND_BESIDE)
+    if legend:
+        ax.legend(**legend)
 
 
 def _limit_zoom(ax: Axes, values: Iterable[np.ndarray]) -> None:

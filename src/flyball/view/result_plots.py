@@ -19,14 +19,14 @@ from .plotting import (
     DASH_STYLES,
     LEGEND_BESIDE,
     PALETTE,
-    axis_label,
     finish_figure,
     new_figure,
     panels_over_time,
+    plot_panel,
     plot_style,
     set_title,
 )
-from .recording import Channel, Figure, Picture, PointPaths
+from .recording import Channel, Figure, Panel, Picture, PointPaths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -273,14 +273,14 @@ def spectrum_plot(spectrum: Spectrum, path: str | os.PathLike | None = None) -> 
         drawing = new_figure(0.9 + 2.7 * len(units), 11.0)
         for (left, right), unit in zip(drawing.subplots(len(units), 2, squeeze=False), units, strict=True):
             own = [k for k, u in enumerate(spectrum.units) if u == unit]
-            for i, k in enumerate(own):
-                left.plot(spectrum.frequency, spectrum.amplitude[:, k], label=spectrum.names[k], **_curve_style(i))
-                density = np.where(spectrum.density[:, k] > 0.0, spectrum.density[:, k], np.nan)
-                right.plot(spectrum.density_frequency, density, **_curve_style(i))
-            left.set_ylabel(axis_label("amplitude", unit))
+            density = np.where(spectrum.density > 0.0, spectrum.density, np.nan)
+            for ax, label, x, values, its_unit, legend in (
+                (left, "amplitude", spectrum.frequency, spectrum.amplitude, unit, {}),
+                (right, "density", spectrum.density_frequency, density, spectrum.density_units[own[0]], LEGEND_BESIDE),
+            ):
+                curves = tuple(Channel(spectrum.names[k], its_unit.replace("^2", "²"), values[:, k]) for k in own)
+                plot_panel(ax, x, Panel(label, curves), legend)
             left.set_ylim(bottom=0.0)
-            left.legend(loc="upper right")
-            right.set_ylabel(axis_label("density", spectrum.density_units[own[0]].replace("^2", "²")))
             if (most := spectrum.density[:, own].max()) > 0.0:
                 right.set_yscale("log")
                 low, high = right.get_ylim()

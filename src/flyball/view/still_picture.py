@@ -172,8 +172,8 @@ class Stroke(NamedTuple):
     pin: str = ""  # a symbol of fixed size at a single point: "circle", "block" or "ground"
 
 
-def still_svg(recording: Recording) -> str:
-    """Return the picture of the first time of a recording, as the text of an SVG element."""
+def still_svg(recording: Recording, title: str = "") -> str:
+    """Return the picture of the first time of a recording, as the text of an SVG element; with a title for readers."""
     drawn = scene_strokes(recording)
     if not drawn:
         return ""
@@ -188,7 +188,7 @@ def still_svg(recording: Recording) -> str:
         return np.array([PICTURE_WIDTH, height]) / 2 + (p - middle) * scale * [1.0, -1.0]
 
     body = "".join(_stroke_svg(s, placed(s.points)) for s in drawn)
-    title = escape(f"{recording.name} in the reference configuration")
+    title = escape(title or f"{recording.name} in the reference configuration")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" '
         f'width="{PICTURE_WIDTH:g}" '

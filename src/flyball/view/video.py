@@ -19,7 +19,7 @@ import numpy as np
 
 from ..analysis_options import require_count, require_positive
 from ..errors import ModelError
-from ..model.output_files import VIDEO, file_extension, replacing_file
+from ..model.output_files import VIDEO, file_extension, replacing_file, write_file
 from .page import sign_continuous
 from .recording import Recording
 from .still_picture import (
@@ -31,6 +31,7 @@ from .still_picture import (
     Stroke,
     coarse_shape,
     scene_strokes,
+    still_svg,
 )
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
     from ..results.result import Result
 
+PICTURE_WIDTH = 1280  # of a picture of the scene [px]
 OVERSAMPLING = 2  # pixels drawn for each pixel shown, along each side: smooth edges
 MARGIN_SHARE, CAPTION_HEIGHT = 0.04, 22  # margin of the scene, relative to the width; height of the line of text [px]
 WATCHABLE = 2.0, 20.0  # durations [s] that are played in real time
@@ -134,6 +136,23 @@ def save_video(
         _write_by_ffmpeg(path, ending, frames, frames_per_second)
 
 
+def write_scene(result: Result, path: Any) -> None:
+    """Write the animated scene in glTF (.glb), or a picture of it at the first time (.png, .svg)."""
+    from .animation import record_motion
+    from .gltf import gltf_scene
+
+    recording = record_motion(result, curves=False, with_notes=False)
+    ending = Path(path).suffix.lower()
+    if ending == ".glb":
+        write_file(path, gltf_scene(recording))
+    elif ending == ".svg":
+        write_file(path, still_svg(recording, f"{recording.name} at t = {recording.t[0]:g} s"))
+    else:
+        (frame,) = _frames(resampled(recording, recording.t[:1]), PICTURE_WIDTH, "")
+        with replacing_file(path) as file:
+            frame.save(file, "PNG")
+
+
 def _write_gif(path: Any, frames: Iterator[Image.Image], interval: float) -> None:
     from PIL import Image
 
@@ -177,7 +196,7 @@ def _frames(recording: Recording, width: int, speed: str) -> Iterator[Image.Imag
     for t, scene in zip(recording.t, scenes, strict=True):
         centre = np.array([0.5 * size[0], 0.5 * (size[1] - CAPTION_HEIGHT)])
         placed = [(s, centre + (s.points - middle) * scale * [1.0, -1.0]) for s in scene]
-        yield _picture(size, placed, f"t = {t:.{digits}f} s, {speed}")
+        yield _picture(size, placed, f"t = {t:.{digits}f} s, {speed}" if speed else "")
 
 
 def _picture(size: tuple[int, int], strokes: list[tuple[Stroke, np.ndarray]], caption: str) -> Image.Image:

@@ -13,6 +13,7 @@ import { axesMark, partTip, scaleMark } from "./overlay.js";
 import { bodyCount, bodyLegend, channelPicker, summary } from "./panels.js";
 import { Plots } from "./plots.js";
 import { Card } from "./select.js";
+import { saveButtons } from "./save.js";
 import { Shown } from "./shown.js";
 import { Stage } from "./stage.js";
 import { THEMES } from "./theme.js";
@@ -238,12 +239,14 @@ function keepDrawing(clock, picture) {
   const showScale = scaleMark(find(".scale"));
   const draw = (now) => {
     clock.tick(now);
-    if (stage.draw(now)) {
+    const drawn = stage.draw(now);
+    if (drawn) {
       stage.camera.updateMatrixWorld();
       turnAxes(stage.camera);
       showScale(stage.scale);
       picture.names.update(stage.camera, stage.size);
     }
+    picture.onFrame?.(drawn);
     document.body.dataset.ready ??= "";
     requestAnimationFrame(draw);
   };
@@ -369,6 +372,7 @@ export class Player {
     pictureKeys(keys, this.shown, this.chosen, find(".theme"));
     find(".ask").addEventListener("click", () => keys.help());
     reportButtons(stage);
+    saveButtons(find(".menu"), this);
     if (VIEWS.includes(wanted.view) && !stage.planar) stage.look(wanted.view);
     document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
   }
