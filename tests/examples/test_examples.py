@@ -39,6 +39,7 @@ PREPARED = [name for name in EQUATIONS if name != "governor_pi.py"]
 PROMISED = {
     "andrews.toml",
     "bennett.py",
+    "bogie.py",
     "bricard.toml",
     "bouncing_ball.toml",
     "cam.py",
@@ -88,7 +89,7 @@ REDUNDANT = {
     "planetary.py": 2,
     "geneva_drive.toml": 1,
 }  # rows that say nothing new, on purpose
-WAY = {"cam_follower.toml": 0.01}  # what moves least [m]
+WAY = {"bogie.py": 0.01, "cam_follower.toml": 0.01}  # what moves least [m]
 SECONDS = {"governor.toml": 0.2, "andrews.toml": 0.05}  # to be seen of what moves fast; 1 s of the others
 
 
