@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from ..model.names import curve_parts
 from ..model.output_files import MATLAB, PARQUET, TABLE, replacing_file
 from .files import TIME_LABEL
 from .wording import with_unit
@@ -100,7 +101,7 @@ def to_mat(result: Result, path: str | os.PathLike) -> None:
     units: dict[str, dict[str, str]] = {}
     owners: dict[str, str] = {"t": "", "units": ""}
     for name, (unit, values) in result.channels().items():
-        owner, _, what = name.partition(".")
+        owner, what = curve_parts(name)
         field = next(f for f in _field_names(owner) if owners.setdefault(f, owner) == owner)
         out.setdefault(field, {})[_field_name(what)] = values
         units.setdefault(field, {})[_field_name(what)] = unit

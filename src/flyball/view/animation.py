@@ -352,7 +352,7 @@ def _free_length(e: Any, result: Result, points: list[np.ndarray]) -> np.ndarray
     """The free length of a rope: as given, else that at the first time, in place of the reference configuration."""
     numbers = result.values.numbers[e.name]
     if e.transmitted():  # wound up or paid out: its path, and what is slack
-        limit = e.transmitted().partition(".")[0]
+        limit = curve_parts(e.transmitted())[0]
         slack: np.ndarray = result.values.numbers[limit].upper - result[limit].value
         return result[e.name].length + slack
     if getattr(numbers, "length", None) is not None:

@@ -231,19 +231,13 @@ def momentum_plot(momentum: Momentum, path: str | os.PathLike | None = None) -> 
     ModelError
         If the file cannot be written.
     """
+    panels = []
+    for label, values, unit in (("momentum", momentum.linear, "kg m/s"), ("angular", momentum.angular, "kg m²/s")):
+        columns = values.reshape(len(values), -1).T
+        names = "xyz" if len(columns) > 1 else "z"
+        panels.append(Panel(label, tuple(Channel(n, unit, x) for n, x in zip(names, columns, strict=False))))
     with plot_style():
-        drawing = new_figure(6.0)
-        upper, lower = drawing.subplots(2, 1, sharex=True)
-        for ax, values, title, unit in (
-            (upper, momentum.linear, "momentum", "kg m/s"),
-            (lower, momentum.angular, "angular momentum", "kg m^2/s"),
-        ):
-            columns = values.reshape(len(values), -1).T
-            for k, (name, x) in enumerate(zip("xyz" if len(columns) > 1 else "z", columns, strict=False)):
-                ax.plot(momentum.t, x, label=name, **_curve_style(k))
-            ax.set_ylabel(axis_label(title, unit.replace("^2", "²")))
-            ax.legend(loc="upper right")
-        lower.set_xlabel("t [s]")
+        drawing = panels_over_time(momentum.t, tuple(panels))
         few = len(momentum.bodies) <= NAMED_BODIES
         bodies = ", ".join(momentum.bodies) if few else f"{len(momentum.bodies)} bodies"
         set_title(drawing, f"Momentum of {bodies} about {momentum.about}")
