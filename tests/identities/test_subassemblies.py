@@ -90,6 +90,34 @@ def test_random_mechanisms(family, seed, how):
     assert_images(m, whole, place, 0.05)
 
 
+BOX = fb.Box(edges=(0.3, 0.05, 0.05), density=1000, position=(0.15, 0, 0))
+LATER = {  # elements with parts of their own, or whose texts name coordinates
+    "force": lambda: fb.LinearActuator("C", "ground", "b", at=((0.2, 1), (1.5, 0.2)), force="30 - 5*rate"),
+    "length": lambda: fb.LinearActuator(
+        "C", "ground", "b", at=((0.2, 1), (1.5, 0.2)), length="1.526433752247179 - 0.2*t**2"
+    ),
+    "masses": lambda: fb.LinearActuator("C", "ground", "b", at=((0.2, 1), (1.5, 0.2)), force="30", barrel=BOX, rod=BOX),
+    "constraint": lambda: fb.Constraint("K", "A.angle - 2*B.angle + 0.3*B.angle**2 - 0.4*t**2"),
+    "speed": lambda: fb.Motor("M", "A", speed="3*t", limit="50"),
+    "saturated": lambda: fb.Motor("M", "A", speed="5", limit="10"),
+    "rate": lambda: fb.Driver("D", "A.angle_rate", "2*t"),
+    "winch": lambda: fb.Rope("R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), drum="A.angle", radius=0.1),
+    "elastic winch": lambda: fb.Rope(
+        "R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), drum="A.angle", radius=0.1, stiffness=100
+    ),
+    "feed": lambda: fb.Rope("R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), feed="-0.1*t**2"),
+}
+
+
+@pytest.mark.parametrize("how", ["turned", "mirrored x", "mirrored y", "mirrored and turned"])
+@pytest.mark.parametrize("name", LATER)
+def test_elements_made_of_parts(name, how):
+    m = fb.Mechanism("double pendulum", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Body("b", mass=1, inertia=0.1, position=(1.5, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)), LATER[name]())
+    assert_images(m, *placed(m, PLACED[how]))
+
+
 def in_contact() -> fb.Mechanism:
     """Solids without symmetry on a floor of unequal friction that moves like a belt, and a set of bodies."""
     m = fb.Mechanism("scene", gravity=(0, 0, -9.81))

@@ -53,7 +53,7 @@ class Motor(JointForce):
     limit: Law | None = None
 
     kind: ClassVar[int] = KIND
-    odd: ClassVar[tuple[str, ...]] = ("torque",)
+    odd: ClassVar[tuple[str, ...]] = ("torque", "speed")
     effort: ClassVar = staticmethod(effort)
     outputs: ClassVar[dict[str, str]] = {"angle": "rad", "rate": "rad/s", "torque": "N*m"}
     shows_parts: ClassVar[bool] = False

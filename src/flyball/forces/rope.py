@@ -122,6 +122,7 @@ class Rope(PathForce):
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N", "taut": "1"}
     single: ClassVar[str] = "rope"
     shows_parts: ClassVar[bool] = False
+    reversing: ClassVar[dict[str, str]] = {"drum": "radius"}
 
     def check(self, n: SimpleNamespace) -> None:
         """Require enough points, and valid constants."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 LAW = LawOf(None, curves=True)
-_COORDINATE = re.compile(r"(?<![\w.])[^\W\d]\w*\.[^\W\d]\w*")
+_COORDINATE = re.compile(r"(?<![\w.])[^\W\d]\w*(?:\.[^\W\d]\w*)+")
 
 
 @element
@@ -47,6 +47,10 @@ class Constraint(Coupling):
     def equation(self, model: Model) -> Expression:
         """Return g as an expression of known names."""
         return model.law(self.law, LAW, f"law of {self.title}", driver=True)  # type: ignore[no-any-return]
+
+    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
+        """Return none: the law of a copy names reversed coordinates with their signs."""
+        return {}
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
         """Return no weights: it is no weighted sum."""

@@ -46,6 +46,9 @@ class Force(Element):
     outputs: ClassVar[dict[str, str]] = {}
     symbol: ClassVar[str] = ""
     single: ClassVar[str] = ""  # "rope" or "friction": impulse time stepping treats it as a single row, not as a force
+    reversing: ClassVar[
+        dict[str, str]
+    ] = {}  # field that names a coordinate -> field that changes sign with its direction
     fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 
     def ends(self) -> dict[str, str]:

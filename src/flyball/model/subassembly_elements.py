@@ -49,7 +49,7 @@ def _kinds(cls: Any) -> dict[str, str]:
     out = {}
     for f in dataclasses.fields(cls):
         types = set(_members(hints[f.name]))
-        if f.name == "law" and issubclass(cls, Driver):
+        if f.name == "law" and (issubclass(cls, Driver) or LawOf in map(type, typing.get_args(hints[f.name])[1:])):
             out[f.name] = "formulas"
         elif str in types and f.name not in WORDS:
             out[f.name] = "formulas" if float in types or "function" in types else "names"
@@ -424,6 +424,10 @@ class Subassembly:
         else:
             self._laws(e, new, {}, {})
             self._vectors(e, new)
+            for name, factor in e.reversing.items():
+                coordinate = getattr(e, name)
+                if coordinate is not None and self.image(coordinate, e).sign < 0.0:
+                    new[factor] = scaled(-1.0, self._value(e, new, factor))
         if isinstance(e, BodyForce):
             self._components(e, new)
         elif getattr(e, "orientation", "") != "" and e.at is not None and isinstance(e, TwoFrameForce):  # type: ignore[attr-defined]
