@@ -65,6 +65,7 @@ PROMISED = {
     "pendulum_chain.py",
     "planetary.py",
     "point_mass_pendulum.toml",
+    "press.py",
     "quick_return.toml",
     "ratchet.toml",
     "rattleback.toml",

@@ -52,3 +52,48 @@ def test_klingels_wavelength(stiff):
     q = BOGIE
     klingel = 2 * np.pi * np.sqrt(q["r"] * (q["b"] ** 2 + stiff * q["a"] ** 2) / (q["conicity"] * q["b"]))
     assert wavelengths == pytest.approx(klingel * np.ones(1 if stiff else 2), rel=1e-5)
+
+
+PRESS_MASS, SHAFT, ECCENTRICITY, ROD = 6620.0, 2.2, 0.05, 0.6
+TURN = 2 * np.pi * 2  # rad/s
+
+
+def test_press_sinks_by_its_weight_and_has_six_modes_on_its_mounts():
+    """Bounce, yaw, and in each vertical plane a sway and a rock, with the second-order work of the static force."""
+    stiffness, shear, x, y = 1e6, 4e5, 0.5, 0.9
+    m = example("press.py", speed=0.0, mount_damping=0.0)
+    rest = m.equilibrium()
+    weight = PRESS_MASS * 9.81
+    assert 1 - rest["frame.z"] == pytest.approx(weight / (4 * stiffness), rel=1e-10)
+    wrist = SHAFT + ECCENTRICITY - ROD
+    masses, heights = np.array([6000, 200, 120, 300]), np.array([1, SHAFT, wrist + ROD / 2, wrist])
+    height = masses @ heights / PRESS_MASS
+    apart = masses @ (heights - height) ** 2
+    squares = [4 * stiffness / PRESS_MASS, 4 * shear * (x**2 + y**2) / (2500 + 6 + 0.5 + 8)]
+    for inertia, arm in ((5000 + 10 + 5 + 9 + apart, y), (3500 + 6 + 5 + 9 + apart, x)):
+        tilt = 4 * (stiffness * arm**2 + shear * height**2) - weight * height
+        K = np.array([[4 * shear, 4 * shear * height], [4 * shear * height, tilt]])
+        squares.extend(np.linalg.eigvals(np.linalg.solve(np.diag([PRESS_MASS, inertia]), K)))
+    assert np.sort(m.modes(about=rest).omega) == pytest.approx(np.sqrt(np.sort(squares)), rel=1e-8)
+
+
+def test_press_shakes_the_ground_by_its_moving_masses_only():
+    """The vertical motion is that of one mass on a spring and a damper; the small roll adds a thousandth."""
+    t = np.linspace(9.0, 9.5, 200, endpoint=False)  # a turn, after the start has died away
+    run = example("press.py").simulate(10, outputs=[0, *t, 10])
+    wrist = ECCENTRICITY * np.cos(TURN * t) - np.sqrt(ROD**2 - (ECCENTRICITY * np.sin(TURN * t)) ** 2)
+    stroke = run["guide.displacement"][1:-1]
+    assert stroke == pytest.approx(wrist - (ECCENTRICITY - ROD), abs=1e-11)
+    assert np.ptp(stroke) == pytest.approx(2 * ECCENTRICITY, rel=1e-3)
+    moment = 300 * wrist + 120 * (wrist + ECCENTRICITY * np.cos(TURN * t)) / 2
+    omega = 2 * np.pi * np.fft.rfftfreq(200, 0.5 / 200)
+    mount = 4e6 + 4e4j * omega
+    response = omega**2 * np.fft.rfft(moment) / (mount - PRESS_MASS * omega**2)
+    lift = np.fft.irfft(response, 200)
+    weight = PRESS_MASS * 9.81
+    assert run["frame.z"][1:-1] == pytest.approx(1 - weight / 4e6 + lift, abs=3e-3 * np.ptp(lift))
+    force, ground = np.fft.irfft(mount * response, 200), sum(run[f"mount {k}.fz"][1:-1] for k in (1, 2, 3, 4))
+    assert ground == pytest.approx(weight - force, abs=3e-3 * np.ptp(force))
+    idle = example("press.py", press_force=0.0).simulate(10, outputs=[0, *t, 10])
+    assert idle["mount 1.fz"] == pytest.approx(run["mount 1.fz"], abs=1e-4 * np.ptp(force))
+    assert np.ptp(run["drive.effort"]) > 5 * np.ptp(idle["drive.effort"])
