@@ -61,6 +61,7 @@ PROMISED = {
     "linkages.py",
     "n_four_bar.py",
     "oldham.toml",
+    "parallel_platforms.py",
     "peaucellier.toml",
     "pendulum_chain.py",
     "planetary.py",

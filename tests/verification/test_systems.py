@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import runpy
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
-from tests.mechanisms import example
+from tests.mechanisms import EXAMPLES, example
 
 BOGIE = {"m": 1500.0, "Iz": 900.0, "M": 3000.0, "I": 3500.0, "r": 0.46, "b": 0.75, "a": 1.25, "conicity": 0.1}
 CREEP, PRIMARY_X, PRIMARY_Y, SECONDARY, DAMPING = 6e6, 4e6, 5e6, 3e5, 2e4  # the springs' half distance across is 1 m
@@ -97,3 +100,50 @@ def test_press_shakes_the_ground_by_its_moving_masses_only():
     idle = example("press.py", press_force=0.0).simulate(10, outputs=[0, *t, 10])
     assert idle["mount 1.fz"] == pytest.approx(run["mount 1.fz"], abs=1e-4 * np.ptp(force))
     assert np.ptp(run["drive.effort"]) > 5 * np.ptp(idle["drive.effort"])
+
+
+PLATFORMS = runpy.run_path(str(EXAMPLES / "parallel_platforms.py"))
+G = np.array([0.0, 0.0, -9.81])
+
+
+def test_leg_forces_of_the_hexapod():
+    """Six lines of force hold the platform; each leg's weight is carried square to it by both of its ends."""
+    m = PLATFORMS["hexapod"]("0")
+    assert len(m.bodies) == 13
+    found = m.inverse_dynamics([0.0, 0.1])
+    lines, load, along = np.zeros((6, 6)), np.r_[-500 * G, 0, 0, 0], np.zeros(6)
+    for k, (foot, top) in enumerate(PLATFORMS["HEXAPOD"]):
+        length = np.linalg.norm(top - foot)
+        d, arm = (top - foot) / length, top - np.array([0, 0, 1.2])
+        across = np.cross(length / 4 * np.cross(d, 20 * G) + 3 * length / 4 * np.cross(d, 8 * G), d) / length
+        lines[:, k] = np.r_[d, np.cross(arm, d)]
+        load -= np.r_[across, np.cross(arm, across)]
+        along[k] = -8 * G @ d
+    forces = np.linalg.solve(lines, load) + along
+    assert [found[f"drive {k}"].effort[0] for k in range(1, 7)] == pytest.approx(forces, rel=1e-10)
+
+
+def test_platform_of_the_test_facility_moves_as_asked():
+    """Pose, and the eight strokes that it needs in closed form."""
+    m = PLATFORMS["mechanism"]()
+    assert len(m.bodies) == 17
+    free = PLATFORMS["platform"]("facility", PLATFORMS["FACILITY"]).check()
+    assert (free.gruebler, free.freedoms, free.redundancy) == (6, 6, 0)
+    run = m.simulate(2, outputs=101)
+    t = run.t
+    position = np.column_stack([0.06 * np.sin(6 * t), 0.04 * np.sin(9 * t), 1.2 + 0.05 * np.sin(12 * t)])
+    angles = np.column_stack([0.04 * np.sin(7 * t), 0.05 * np.sin(10 * t), 0.06 * np.sin(8 * t)])
+    turned = Rotation.from_euler("ZYX", angles)
+    assert run["platform"].position == pytest.approx(position, abs=1e-9)
+    assert run["platform"].rotation == pytest.approx(turned.as_matrix(), abs=1e-9)
+    for k, (foot, top) in enumerate(PLATFORMS["FACILITY"], start=1):
+        length = np.linalg.norm(position + turned.apply(top - [0, 0, 1.2]) - foot, axis=1)
+        assert run[f"slide {k}.displacement"] == pytest.approx(length - np.linalg.norm(top - foot), abs=1e-9)
+
+
+def test_reactions_of_the_test_facility_sum_to_its_weight():
+    still = {"x": "0.05", "y": "-0.03", "z": "1.25", "roll": "0.05", "pitch": "0.04", "yaw": "-0.06"}
+    run = PLATFORMS["mechanism"](still).simulate(0.1, outputs=3)
+    feet = sum(run[f"foot {k}"].force for k in range(1, 9))
+    drives = np.column_stack([run[f"drive {axis}.effort"] for axis in "xyz"])
+    assert feet + drives == pytest.approx(np.tile(-(500 + 8 * 28) * G, (3, 1)), abs=1e-8)
