@@ -83,6 +83,7 @@ PROMISED = {
     "t_handle.toml",
     "thin_rod.toml",
     "toggle_press.toml",
+    "two_shafts.py",
 }
 REDUNDANT = {
     "bennett.py": 3,

@@ -147,3 +147,36 @@ def test_reactions_of_the_test_facility_sum_to_its_weight():
     feet = sum(run[f"foot {k}"].force for k in range(1, 9))
     drives = np.column_stack([run[f"drive {axis}.effort"] for axis in "xyz"])
     assert feet + drives == pytest.approx(np.tile(-(500 + 8 * 28) * G, (3, 1)), abs=1e-8)
+
+
+def shafts(omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles of both shafts by torque on the first, of the two equations of motion."""
+    rope = 2 * (2e4 + 10j * omega)
+    one = 0.1**2 * rope + 0.05j * omega - 0.05 * omega**2
+    two = 0.2**2 * rope + 500 + 2j * omega - 0.4 * omega**2
+    determinant = one * two - (0.1 * 0.2 * rope) ** 2
+    return two / determinant, 0.1 * 0.2 * rope / determinant
+
+
+def test_torsional_frequencies_and_transfer_functions_of_two_shafts():
+    m = example("two_shafts.py")
+    linear = m.linearize(["motor"], ["shaft 1.angle", "shaft 2.angle"])
+    omega = np.geomspace(1, 500, 30)
+    for angle, expected in zip(("shaft 1.angle", "shaft 2.angle"), shafts(omega), strict=True):
+        assert linear.response(omega, "motor", angle) == pytest.approx(expected, rel=1e-10)
+    undamped = example("two_shafts.py", rope_damping=0.0, rubber_damping=0.0, damper=0.0)
+    rope, inertia = 4e4, np.array([0.05, 0.4])
+    K = np.array([[rope * 0.01, -rope * 0.02], [-rope * 0.02, rope * 0.04 + 500]])
+    a, b = np.trace(K / inertia[:, None]) / 2, np.linalg.det(K) / inertia.prod()
+    squares = a + np.array([-1, 1]) * np.sqrt(a**2 - b)
+    assert undamped.modes().omega == pytest.approx(np.sqrt(squares), rel=1e-10)
+
+
+def test_two_shafts_on_inelastic_ropes_are_one_oscillator():
+    """The first shaft turns twice as far as the second."""
+    m = example("two_shafts.py", elastic=False)
+    (found,) = (x for x in m.modes().eigenvalues if x.imag > 0)
+    inertia, damping = 0.05 * 4 + 0.4, 0.05 * 4 + 2
+    assert found == pytest.approx(np.roots([inertia, damping, 500])[0], rel=1e-10)
+    run = m.simulate(1, outputs=101)
+    assert run["shaft 1.angle"] == pytest.approx(2 * run["shaft 2.angle"], abs=1e-12)
