@@ -62,10 +62,12 @@ PROMISED = {
     "linkages.py",
     "n_four_bar.py",
     "oldham.toml",
+    "parallel_platforms.py",
     "peaucellier.toml",
     "pendulum_chain.py",
     "planetary.py",
     "point_mass_pendulum.toml",
+    "press.py",
     "quick_return.toml",
     "ratchet.toml",
     "rattleback.toml",
@@ -82,6 +84,7 @@ PROMISED = {
     "t_handle.toml",
     "thin_rod.toml",
     "toggle_press.toml",
+    "two_shafts.py",
 }
 REDUNDANT = {
     "bennett.py": 3,
