@@ -36,6 +36,7 @@ from ..errors import FlyballError, ModelError, SimulationError
 from ..model.model import Model
 from ..results.result import Result
 from ..view.animation import record_motion
+from ..view.reference_picture import reference_svg
 from ..view.page import pack_recording
 from ..view.recording import Recording
 from .dragging import AssemblyDrag, DragTarget
@@ -281,6 +282,7 @@ class LiveSession:
                 "watched": self._file is not None,
                 "movable": [b.name for b in model.bodies],
                 "sliders": [dataclasses.asdict(x) for x in new.values()],
+                "picture": reference_svg(model) if self._result is None else "",  # until the first motion is computed
             },
         )
 
