@@ -36,9 +36,9 @@ from ..errors import FlyballError, ModelError, SimulationError
 from ..model.model import Model
 from ..results.result import Result
 from ..view.animation import record_motion
-from ..view.reference_picture import reference_svg
 from ..view.page import pack_recording
 from ..view.recording import Recording
+from ..view.reference_picture import reference_svg
 from .dragging import AssemblyDrag, DragTarget
 from .messages import InvalidMessage, finite_number
 from .options import LiveOptions, Slider, make_sliders
