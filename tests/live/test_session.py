@@ -123,6 +123,11 @@ def test_a_motion_that_stops_is_shown_as_far_as_it_goes():
     assert 2 <= len(page.newest["run"]["recording"]["t"]) < 101
 
 
+def test_the_mechanism_is_shown_until_the_first_motion_is_computed():
+    page = Page(example("slider_crank.toml"))
+    assert "<svg" in page.newest["model"]["picture"]
+
+
 def test_slow_computations_say_so():
     assert slow_remark(0.9, 5.0) == ""
     assert slow_remark(6.0, 3.0) == "slow: 2 s of computing for 1 s of motion"

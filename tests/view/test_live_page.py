@@ -112,6 +112,7 @@ def poses(m: fb.Mechanism, time: int, **given: Any) -> np.ndarray:
 
 def test_numbers_on_the_page_are_the_engines(live: Open) -> None:
     tab = live(fb.load(FOUR_BAR))
+    assert tab.locator(".waiting").inner_html() == ""  # the picture of the model has gone
     tab.after_run(lambda: tab.fill("speed", 90.0))
     expected = fb.load(FOUR_BAR).simulate(1.0, outputs=101, parameters={"speed": "90.0 rpm"})
     for name in ("A.angle", "C.angle", "motor.effort"):

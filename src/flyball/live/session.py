@@ -39,6 +39,7 @@ from ..results.result import Result
 from ..view.animation import record_motion
 from ..view.page import pack_recording
 from ..view.recording import Recording
+from ..view.reference_picture import reference_svg
 from .dragging import AssemblyDrag, DragTarget
 from .messages import InvalidMessage, finite_number
 from .options import LiveOptions, Slider, make_sliders
@@ -282,6 +283,7 @@ class LiveSession:
                 "watched": self._file is not None,
                 "movable": [b.name for b in model.bodies],
                 "sliders": [dataclasses.asdict(x) for x in new.values()],
+                "picture": reference_svg(model) if self._result is None else "",  # until the first motion is computed
             },
         )
 

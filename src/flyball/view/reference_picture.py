@@ -26,12 +26,16 @@ def mechanism_html(model: Model) -> str:
     An incomplete description that cannot be drawn yet is shown without a picture; analyses report its errors.
     """
     text = f'<pre style="line-height:1.35;overflow-x:auto">{html.escape(summary(model))}</pre>'
+    return f"<div>{reference_svg(model)}{text}</div>"
+
+
+def reference_svg(model: Model) -> str:
+    """Return a picture of the reference configuration, as the text of an SVG element; empty if it cannot be drawn."""
     try:
         with np.errstate(all="ignore"):
-            picture = still_svg(record_motion(reference_result(model), curves=False, with_notes=False))
+            return still_svg(record_motion(reference_result(model), curves=False, with_notes=False))
     except (FlyballError, ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError):
-        picture = ""
-    return f"<div>{picture}{text}</div>"
+        return ""
 
 
 # The reference configuration, read like any result, for pictures before anything is computed.

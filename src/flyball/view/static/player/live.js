@@ -79,10 +79,11 @@ class Live {
     });
   }
 
-  #describe({ name, planar, sliders, movable }) {
+  #describe({ name, planar, sliders, movable, picture }) {
     if (this.player && this.player.recording.planar !== planar) return location.reload();
     document.querySelector(".player h1").textContent = document.title = name;
     this.movable = new Set(movable);
+    if (!this.player) document.querySelector(".waiting").innerHTML = picture; // of the model, as flyball drew it
     this.parameters = sliders.map((slider) => new Parameter(slider, (what, value) => this.set(what, value)));
     find(".parameters").replaceChildren(...this.parameters.map(({ row }) => row));
     const chosen = sliders.some((slider) => slider.chosen);
@@ -104,6 +105,7 @@ class Live {
   }
 
   #begin(recording) {
+    document.querySelector(".waiting").replaceChildren();
     this.player = new Player(recording);
     this.variants = new Variants(this.player, find(".variants"));
     this.player.onUpdate = (time) => this.variants.seek(time);
