@@ -34,7 +34,7 @@ def strand(side: int) -> fb.Rod:
     r1, r2 = RADII
     across = (r1 - r2) / DISTANCE
     normal = np.array([across, side * np.sqrt(1 - across**2), 0])
-    return fb.Rod(start=r1 * normal, end=np.array([DISTANCE, 0, 0]) + r2 * normal, radius=0.006, looks=True)
+    return fb.Rod(start=r1 * normal, end=np.array([DISTANCE, 0, 0]) + r2 * normal, radius=0.003, looks=True)
 
 
 def mechanism(elastic: bool = True, **parameters: float) -> fb.Mechanism:

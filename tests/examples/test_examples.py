@@ -51,6 +51,7 @@ PROMISED = {
     "chaplygin_sleigh.toml",
     "clock_escapement.toml",
     "clutch_start.toml",
+    "differential.py",
     "double_wishbone.toml",
     "gear_backlash.toml",
     "geneva_drive.toml",
@@ -89,6 +90,7 @@ PROMISED = {
 REDUNDANT = {
     "bennett.py": 3,
     "bricard.toml": 1,
+    "differential.py": 1,
     "planetary.py": 2,
     "geneva_drive.toml": 1,
 }  # rows that say nothing new, on purpose

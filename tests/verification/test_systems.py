@@ -6,6 +6,7 @@ import runpy
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -180,3 +181,25 @@ def test_two_shafts_on_inelastic_ropes_are_one_oscillator():
     assert found == pytest.approx(np.roots([inertia, damping, 500])[0], rel=1e-10)
     run = m.simulate(1, outputs=101)
     assert run["shaft 1.angle"] == pytest.approx(2 * run["shaft 2.angle"], abs=1e-12)
+
+
+@pytest.mark.parametrize("pinions", [1, 2])
+def test_differential_keeps_the_mean_speed_and_splits_the_torque_in_halves(pinions):
+    """Two linear equations: of the cage's speed c, and of half the difference d of the wheels' speeds c + d and c - d."""
+    run = example("differential.py", pinions=pinions).simulate(4, outputs=81, rtol=1e-10)
+    left, right = run["speed_left"].value, run["speed_right"].value
+    assert left + right == pytest.approx(2 * run["cage bearing.angle_rate"], abs=1e-12)
+    inertia = np.array([
+        0.05 + pinions * (1e-4 + 0.2 * 0.06**2) + 2 * 0.5,
+        2 * 0.5 + pinions * 1e-4 * (24 / 16) ** 2,
+    ])  # fmt: skip
+    A = -np.array([[2.5, 0.5 - 2], [0.5 - 2, 2.5]]) / inertia[:, None]
+    end = np.linalg.solve(A, [-20 / inertia[0], 0])
+    mean, half = np.array([end - expm(A * t) @ end for t in run.t]).T
+    assert left == pytest.approx(mean + half, abs=1e-7)
+    assert right == pytest.approx(mean - half, abs=1e-7)
+    assert (end.sum(), end[0] - end[1]) == pytest.approx((20 / 2 / 0.5, 20 / 2 / 2))
+    slopes = np.array([A @ (expm(A * t) @ end) for t in run.t])  # minus the accelerations
+    for name, speed, sense, resistance in (("left", left, 1, 0.5), ("right", right, -1, 2)):
+        torque = sum(run[f"{name} mesh {k}.effort_1"] for k in range(1, pinions + 1))
+        assert torque == pytest.approx(resistance * speed - 0.5 * (slopes @ [1, sense]), abs=1e-6)
