@@ -76,8 +76,10 @@ def mechanism(**parameters: float) -> fb.Mechanism:
     m.add(fb.CoordinateSpring("secondary springs, yaw", "frame.angle", **turning))
     for k, (name, x) in enumerate(places.items(), start=1):
         m.add(fb.PointOnLine(f"guide {k}", "ground", name, at=(x, 0), axis=(0, 1)))
-        primary = {"stiffness": (0, "2*primary_y"), "torsional_stiffness": "2*primary_x*half_width**2"}
-        m.add(fb.Bushing(f"axle boxes {k}", "frame", name, at=(x, 0), **primary))
+        lateral = {"weights": [1, -1, f"-({x})"], "stiffness": "2*primary_y"}
+        turn = {"weights": [1, -1], "stiffness": "2*primary_x*half_width**2"}
+        m.add(fb.CoordinateSpring(f"axle boxes {k}, lateral", [f"{name}.y", "frame.y", "frame.angle"], **lateral))
+        m.add(fb.CoordinateSpring(f"axle boxes {k}, yaw", [f"{name}.angle", "frame.angle"], **turn))
         measured = {"lateral": "y", "rate": "vy", "yaw": "angle", "yaw_rate": "omega"}
         m.add(*(fb.Sensor(f"{sensor}_{k}", f"{name}.{of}") for sensor, of in measured.items()))
         m.add(*creep(k))

@@ -38,7 +38,8 @@ class _Numbers:
         new = {}
         for name, unit in fields_with(type(e), Unit).items():
             value = getattr(e, name)
-            if value is not None and not (self.planar and name == "inertia_about"):
+            of_the_plane = not self.planar and isinstance(e, fb.Bushing) and name == "angle"
+            if value is not None and not of_the_plane and not (self.planar and name == "inertia_about"):
                 new[name] = self.value(value, f"{type(e).__name__}.{name}", unit.dimension)
         if isinstance(e, fb.Body) and e.shape is not None:
             shapes = tuple(self.element(s) for s in e.shapes())

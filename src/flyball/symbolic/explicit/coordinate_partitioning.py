@@ -361,6 +361,8 @@ def _with_reference_turns(d: Definition, probe: Probe) -> Definition | None:
     values = []
     for w, y in zip(d.symbols, d.values, strict=False):
         missing = probe.start[w.data.name] - probe.at_start(y)
+        if not math.isfinite(missing):  # a formula that divides by zero there, as at a dead centre
+            return None
         turns = round(missing / (2.0 * math.pi))
         if not abs(missing - 2.0 * math.pi * turns) <= 1e-7 * (1.0 + abs(missing)):
             return None
