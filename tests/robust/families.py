@@ -268,6 +268,17 @@ def couplings(d: Dice) -> Case:
     return case
 
 
+def curves(d: Dice) -> Case:
+    """Points on curves, flat-faced cams, nonlinear constraints."""
+    case, m = _case(d, "curves", 0.5)
+    tree(d, m, case, d.whole(1, 3), kinds=["Revolute", "Prismatic", "PointOnCurve"])
+    close(d, m, case, d.whole(0, 2), kinds=["FlatFacedCam", "PointOnCurve", "Cam"])
+    for k in range(d.whole(0, 2)):
+        case.add(lambda k=k: coupling(d, m, f"C{k}", ("Constraint", "Coupler")))
+    dress(d, m, case, most=2)
+    return case
+
+
 def friction(d: Dice) -> Case:
     case, m = _case(d, "friction", 0.2)
     tree(d, m, case, d.whole(1, 3), kinds=["Revolute", "Prismatic"])
@@ -355,7 +366,7 @@ FAMILIES = {
     f.__name__: f
     for f in (
         chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, stiff, drivers, orientations, couplings, friction,
-        crowds, stops, sticking, ropes, latches, happenings, shaken,
+        crowds, stops, sticking, ropes, latches, happenings, shaken, curves,
     )
 }  # fmt: skip
 

@@ -79,6 +79,25 @@ def _cam(d: Dice, name: str, i: str, j: str, p):
     return fb.Cam(name, i, j, points=points, centre=plus(p, 1.0, off), at=p, radius=d.pick([0.0, 0.02]), **axis)
 
 
+def _flat_faced_cam(d: Dice, name: str, i: str, j: str, p):
+    """An ellipse, touched at the end of an axis."""
+    a, b = d.size(0.1, 0.5), d.size(0.1, 0.5)
+    points = [(a * math.cos(u), b * math.sin(u)) for u in (2 * math.pi * k / 40 for k in range(40))]
+    if d.planar:
+        return fb.FlatFacedCam(name, i, j, points=points, centre=plus(p, -a, (1.0, 0.0)), at=p, normal=(1, 0))
+    centre = plus(p, -a, (1.0, 0.0, 0.0))
+    return fb.FlatFacedCam(name, i, j, points=points, centre=centre, at=p, normal=(1, 0, 0), axis=(0, 0, 1))
+
+
+def _point_on_curve(d: Dice, name: str, i: str, j: str, p):
+    """A closed curve, or an open one that begins before the point."""
+    r, wave, closed = d.size(0.1, 0.5), d.number(0.0, 0.2), d.chance(0.5)
+    angles = [2 * math.pi * k / 24 for k in range(24)] if closed else [0.3 * k - 1.5 for k in range(16)]
+    points = [(r * math.cos(u), r * math.sin(u), r * wave * math.sin(2 * u))[: len(p)] for u in angles]
+    centre = plus(p, -r, (1.0, 0.0, 0.0)[: len(p)])
+    return fb.PointOnCurve(name, i, j, points=points, centre=centre, at=p, closed=closed)
+
+
 PLANAR = {
     "Revolute": _revolute,
     "Translational": _axis("Translational"),
@@ -92,6 +111,8 @@ PLANAR = {
     "WheelOnLine": _wheel,
     "KnifeEdge": _knife_edge,
     "Cam": _cam,
+    "FlatFacedCam": _flat_faced_cam,
+    "PointOnCurve": _point_on_curve,
 }
 SPATIAL = {
     "Revolute": _revolute,
@@ -112,14 +133,21 @@ SPATIAL = {
     "RollingBall": _rolling_ball,
     "KnifeEdge": _knife_edge,
     "Cam": _cam,
+    "FlatFacedCam": _flat_faced_cam,
+    "PointOnCurve": _point_on_curve,
 }
-COUPLINGS = ("GearPair", "RackAndPinion", "Coupler")
+COUPLINGS = ("GearPair", "RackAndPinion", "Coupler", "Constraint")
+CURVED = (
+    "FlatFacedCam",
+    "PointOnCurve",
+    "Constraint",
+)  # of the family of curves alone: seeds of others keep their meaning
 
 
 def joint(d: Dice, name: str, i: str, j: str, p, kinds=None):
     """A joint of a random kind (or of one of ``kinds``) between two bodies, closed at p as drawn."""
     makers = PLANAR if d.planar else SPATIAL
-    return makers[d.pick(kinds or makers)](d, name, i, j, p)
+    return makers[d.pick(kinds or [k for k in makers if k not in CURVED])](d, name, i, j, p)
 
 
 def coordinates(m: fb.Mechanism, ending: str = "") -> list[str]:
@@ -134,16 +162,19 @@ def rotations(m: fb.Mechanism) -> list[str]:
     return [f"{e.name}.{k}" for e in owners for k, c in e.measured(m.planar).items() if c.singular]
 
 
-def coupling(d: Dice, m: fb.Mechanism, name: str):
+def coupling(d: Dice, m: fb.Mechanism, name: str, kinds=None):
     """A coupling between joints that are there, or None if there are too few."""
     angles, slides, both = coordinates(m, ".angle"), coordinates(m, ".displacement"), coordinates(m)
-    kind = d.pick(COUPLINGS)
+    kind = d.pick(kinds or [k for k in COUPLINGS if k not in CURVED])
     if kind == "GearPair" and len(angles) > 1:
         one, two = (c.removesuffix(".angle") for c in d.random.sample(angles, 2))
         return fb.GearPair(name, one, two, teeth=(d.whole(10, 60), d.whole(10, 60)), internal=d.chance(0.3))
     if kind == "RackAndPinion" and angles and slides:
         rack, pinion = d.pick(slides).removesuffix(".displacement"), d.pick(angles).removesuffix(".angle")
         return fb.RackAndPinion(name, rack, pinion, radius=d.pick([-1, 1]) * d.size(0.01, 0.5))
+    if kind == "Constraint" and len(both) > 1:
+        one, two = d.random.sample(both, 2)
+        return fb.Constraint(name, f"{one} - {d.number(-1, 1)}*{two}**2 - {d.number(0.2, 2)}*{two}")
     if kind == "Coupler" and len(both) > 1:
         chosen = d.random.sample(both, min(len(both), d.whole(2, 3)))
         return fb.Coupler(name, chosen, weights=[d.pick([-1, 1]) * d.size(0.1, 10.0) for _ in chosen])

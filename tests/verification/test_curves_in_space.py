@@ -156,3 +156,15 @@ def test_friction():
     assert r["wire.position"] == pytest.approx(0.5 * a * r.t**2, abs=1e-8)
     with pytest.raises(fb.ModelError, match="friction along a curve in space"):
         helix().add(fb.JointFriction("rub", "wire", coordinate="position", static=mu))
+
+
+def test_couplings_name_its_position():
+    """A bead on a wire winds a drum: (m + J / r^2) s'' = m g times the slope, and the sum keeps its reference value."""
+    m = helix()
+    m.add(fb.Body("drum", mass=1, inertia=(0.01, 0.01, 0.002)))
+    m.add(fb.Revolute("A", "ground", "drum", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(fb.Coupler("rope", ("wire.position", "A.angle"), weights=(1, "-0.1 m/rad")))
+    r = m.simulate(1.0, outputs=6, rtol=1e-9)
+    force = 0.3 * G * C / np.hypot(R, C)
+    assert r["wire.position"] == pytest.approx(0.5 * force / (0.3 + 0.002 / 0.01) * r.t**2, rel=1e-5, abs=1e-8)
+    assert r["A.angle"] == pytest.approx(10 * r["wire.position"], abs=1e-9)

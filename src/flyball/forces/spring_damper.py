@@ -38,7 +38,7 @@ def wrench(par, F, M, laws, values):
     e = scale(divide(1.0, length), d)
     t = par[1] * rate + s
     speed = norm(u)
-    way = scale(divide(1.0, speed), u)
+    way = scale(divide(1.0, unless_zero(speed, speed, o + 1.0)), u)
     undefined = choose(absolute(s), o + math.nan, o)
     x = unless_zero(length, t * e[0], par[1] * u[0] + unless_zero(speed, s * way[0], undefined))
     y = unless_zero(length, t * e[1], par[1] * u[1] + unless_zero(speed, s * way[1], undefined))

@@ -204,6 +204,8 @@ class Poses:
 
     def term_value(self, t: TermSpec) -> float:
         """Value of a term's formula in the reference configuration."""
+        if t.formula.of_kind.place:
+            return t.owner.nearest(self.numbers[t.owner.name], *self.ends(t.owner))[0]  # type: ignore[no-any-return]
         poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
         F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
         par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.of_kind.turns else (*t.formula.par[:6], 0.0, 0.0)
