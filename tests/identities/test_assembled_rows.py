@@ -39,11 +39,11 @@ def examine(model, close=1e-6):
         (ahead, ahead_rate), (behind, behind_rate) = (moved(c, q, v, a, s) for s in (H, -H))
         c.at(T, q, v)
         G, nu, gamma = c.jacobian(), c.work.rows.nu.copy(), c.work.rows.gamma.copy()
-        valued = np.array([r.holonomic for r in c.structure.rows])
+        valued = np.array([r.holonomic for r in c.structure.rows], bool)
         assert (ahead - behind)[valued] / (2 * H) == pytest.approx((G @ v - nu)[valued], rel=1e-6, abs=1e-6)
         second = G @ a - gamma
         assert (ahead_rate - behind_rate) / (2 * H) == pytest.approx(
-            second, rel=close, abs=close * np.abs(second).max()
+            second, rel=close, abs=close * np.abs(second).max(initial=0.0)
         )
 
 

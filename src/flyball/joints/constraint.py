@@ -48,10 +48,6 @@ class Constraint(Coupling):
         """Return g as an expression of known names."""
         return model.law(self.law, LAW, f"law of {self.title}", driver=True)  # type: ignore[no-any-return]
 
-    def reversed_factors(self, signs: tuple[float, ...]) -> dict[str, Any]:
-        """Return none: the law of a copy names reversed coordinates with their signs."""
-        return {}
-
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
         """Return no weights: it is no weighted sum."""
         return ()

@@ -67,6 +67,7 @@ class FlatFacedCam(Joint):
     conjugate: Flag = False
 
     blocks: ClassVar = (FLAT_FACE,)
+    local: ClassVar[tuple[str, ...]] = ("points",)
     needs_axis: ClassVar[bool] = True
     symbol: ClassVar[str] = "cam"
     one_sided: ClassVar[bool] = True

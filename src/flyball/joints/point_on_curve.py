@@ -69,6 +69,7 @@ class PointOnCurve(Joint):
     closed: Flag = False
 
     blocks: ClassVar = ACROSS_CURVE
+    local: ClassVar[tuple[str, ...]] = ("points", "formulas")
     coordinates: ClassVar = {"position": Coordinate(ALONG_CURVE)}
     symbol: ClassVar[str] = "curve"
 

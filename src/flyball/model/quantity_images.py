@@ -158,6 +158,8 @@ def joint_image(
         base, suffix = next(iter(own)), f"_{base}"
     if base not in own:
         return None
+    if own[base].row.of_kind.place:  # the arc length along a curve, of which the image has the same
+        return Image(what)
     f, m = frames
     found = coordinate_image(own, base, lambda M: (f @ M[0], f @ M[1] @ m.T), e.primitives(planar), rest)
     return found and found._replace(name=what if found.name == base else f"{found.name}{suffix}", shift=0.0)

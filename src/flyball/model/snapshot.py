@@ -14,7 +14,8 @@ import numpy as np
 
 from ..errors import ModelError
 from .body import Initial
-from .element import python_data
+from .element import Element, python_data
+from .messages import listing, suggest
 
 if TYPE_CHECKING:
     from .element import Element
@@ -157,6 +158,14 @@ def changed_copy(model: Model, parts: Mapping[str, Element | None]) -> Any:
     """Return a copy with other parts under these names, or without them (None)."""
     if not isinstance(parts, Mapping):
         raise ModelError(f"parts maps names to parts, or to None to leave one out: {{'A': None}}; not {parts!r}")
+    for name, e in parts.items():
+        if name in model.parameters:
+            raise ModelError(f"{name!r} is a parameter of {model.name!r}: m.parameters[{name!r}] = ..., or parameters=")
+        if name not in model.by_name:
+            known = list(model.by_name)
+            raise ModelError(f"{model.name!r} has no part {name!r}{suggest(str(name), known)}; {listing(known)}")
+        if not (e is None or isinstance(e, Element)):
+            raise ModelError(f"a part is exchanged for a part, or for None, not {e!r}: {name!r}")
     out = model_copy(model)
     owned: dict[str, Element | None] = {p.name: None for name in parts for p in _parts_of(model, model.find(name))}
     new = [p for e in parts.values() for p in _parts_of(model, e)]

@@ -49,7 +49,8 @@ def _kinds(cls: Any) -> dict[str, str]:
     out = {}
     for f in dataclasses.fields(cls):
         types = set(_members(hints[f.name]))
-        if f.name == "law" and (issubclass(cls, Driver) or LawOf in map(type, typing.get_args(hints[f.name])[1:])):
+        law = f.name == "law" and (issubclass(cls, Driver) or LawOf in map(type, typing.get_args(hints[f.name])[1:]))
+        if law or f.name == "formulas":
             out[f.name] = "formulas"
         elif str in types and f.name not in WORDS:
             out[f.name] = "formulas" if float in types or "function" in types else "names"
@@ -415,7 +416,10 @@ class Subassembly:
         for name, factor in factors.items():
             new[name] = scaled(factor, self._value(e, new, name))
         for name in e.local:
-            new[name] = tuple(product(f, p) for p in self._value(e, new, name))
+            given = self._value(e, new, name)
+            if given is not None:  # points, or the formulas of a point
+                point = isinstance(given[0], str)
+                new[name] = product(f, given) if point else tuple(product(f, p) for p in given)
 
     def _force(self, e: Force, new: dict[str, Any]) -> None:
         self._standing(e, new)
@@ -469,6 +473,8 @@ class Subassembly:
 
     def _along_coordinates(self, e: Any, new: dict[str, Any]) -> None:
         """Reverse what acts along coordinates that are reversed."""
+        if isinstance(e, Coupling) and "law" in new:  # it names the images of its coordinates
+            return
         images = [self.image(text, e) for text in self._along(e)]
         signs = tuple(x.sign for x in images)
         factors = e.reversed_factors(signs) if min(signs, default=1.0) < 0.0 else {}

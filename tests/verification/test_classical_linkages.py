@@ -1,0 +1,82 @@
+"""Linkages of the examples in closed form: Jansen's leg, six-bars, Hoeken's line, Oldham's coupling, Bennett's linkage."""
+
+from __future__ import annotations
+
+import runpy
+
+import numpy as np
+import pytest
+
+from tests.mechanisms import EXAMPLES, example
+
+LINKAGES = runpy.run_path(str(EXAMPLES / "linkages.py"))
+BENNETT = runpy.run_path(str(EXAMPLES / "bennett.py"))
+
+
+def third(a: np.ndarray, b: np.ndarray, r: float, s: float, side: int) -> np.ndarray:
+    """Complex point at r from a and s from b, by the law of cosines in the triangle."""
+    d = b - a
+    turn = np.arccos((abs(d) ** 2 + r**2 - s**2) / (2 * r * abs(d)))
+    return a + r * d / abs(d) * np.exp(1j * side * turn)
+
+
+@pytest.mark.parametrize("name", ["jansen", "watt", "stephenson"])
+def test_points_of_a_linkage_of_dyads(name):
+    """Every point, over a whole turn, one dyad after the other."""
+    linkage, m = LINKAGES["LINKAGES"][name], LINKAGES["mechanism"](name)
+    assert m.mobility().freedoms == 0
+    t = np.linspace(0, 2, 73)
+    run = m.kinematics(t)
+    crank = next(iter(linkage.bars.values()))
+    at = {p: complex(*xy) for p, xy in linkage.given.items()}
+    at[crank[1]] = at[crank[0]] + (at[crank[1]] - at[crank[0]]) * np.exp(1j * np.pi * t)
+    for p, a, r, b, s, side in linkage.dyads:
+        at[p] = third(at[a], at[b], r, s, side)
+    for bar, points in linkage.bars.items():
+        for p in points:
+            found = run[f"{bar} {p}"].position @ [1, 1j]
+            np.testing.assert_allclose(found, linkage.unit * at[p] + 0 * t, atol=1e-12)
+
+
+def test_the_foot_of_jansens_leg_stays_on_the_ground_for_more_than_a_third_of_a_turn():
+    run = LINKAGES["mechanism"]("jansen").kinematics(np.linspace(0, 2, 721))
+    x, y = run["foot S"].position.T
+    stands = y < y.min() + 0.01 * np.ptp(x)
+    assert 0.35 < stands.mean() < 0.45
+    assert np.ptp(x[stands]) > 0.65 * np.ptp(x)
+
+
+def test_hoekens_line_is_straight_to_a_quarter_percent_over_half_a_turn():
+    """Its point is P = B + 2 (C - B), and the coupler is as long as the rocker."""
+    t = np.linspace(0, 2, 721)
+    run = LINKAGES["mechanism"]("hoeken").kinematics(t)
+    b = -0.1 * np.exp(1j * np.pi * t)
+    c = third(b, 0.2 + 0 * t, 0.25, 0.25, 1)
+    x, y = run["coupler P"].position.T
+    np.testing.assert_allclose(x + 1j * y, b + 2 * (c - b), atol=1e-12)
+    straight = np.cos(np.pi * t) > 0
+    assert np.ptp(y[straight]) / np.ptp(x[straight]) < 0.0025
+
+
+def test_oldhams_coupling_keeps_the_speed_and_its_disk_circles_twice_as_fast():
+    run = example("oldham.toml").simulate(1.5, outputs=151)
+    np.testing.assert_allclose(run["driven shaft.angle"], run["driving shaft.angle"], atol=1e-12)
+    np.testing.assert_allclose(run["disk.angle"], 2 * np.pi * run.t, atol=1e-12)
+    centre = run["disk"].position @ [1, 1j] - 0.01  # on the circle over the two shafts
+    np.testing.assert_allclose(centre, -0.01 * np.exp(4j * np.pi * run.t), atol=1e-12)
+    np.testing.assert_allclose(run["motor.effort"], 0.5 * 2 * np.pi, rtol=1e-9)
+
+
+def test_bennetts_linkage_moves_against_the_count():
+    """tan(a/2) tan(b/2) = sin((beta + alpha)/2) / sin((beta - alpha)/2); opposite angles are opposite."""
+    m, ratio = BENNETT["mechanism"](), BENNETT["RATIO"]
+    free = m.changed({"motor": None}).mobility()
+    assert (free.freedoms, free.geometry.gruebler, free.geometry.generic) == (1, -2, 0)
+    assert free.redundancy == 3
+    run = m.kinematics(np.linspace(0, 2, 181))
+    first = np.radians(100) + run["A.angle"]
+    second = 2 * np.arctan(ratio / np.tan(np.radians(50))) + run["B.angle"]
+    sines, cosines = (f(first / 2) * f(second / 2) for f in (np.sin, np.cos))
+    np.testing.assert_allclose(sines, ratio * cosines, atol=1e-12)
+    np.testing.assert_allclose(run["C.angle"], -run["A.angle"], atol=1e-12)
+    np.testing.assert_allclose(run["D.angle"], -run["B.angle"], atol=1e-12)
