@@ -86,7 +86,7 @@ NOT_CONVERTED = {
     **dict.fromkeys(("cam_follower.toml", "gear_backlash.toml"), "play with weights"),
     **dict.fromkeys(("clock_escapement.toml", "geneva_drive.toml", "safety_brake.toml"), "events set parameters"),
     **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "wrecking_ball.py"), "sets of bodies"),
-    "planetary.py": "a sensor of the mean of two rates",
+    **dict.fromkeys(("bogie.py", "differential.py", "planetary.py"), "sensors of angular velocities"),
 }
 """Examples that `fuzzing.scaling` cannot write in other units."""
 EXEMPT = {
@@ -96,7 +96,10 @@ EXEMPT = {
 """Motions that may differ, by family, and why."""
 ROBOTS = ("quadruped.py", "robot_arm_circle.py", "five_bar.py")
 """Examples whose controllers' laws, or tables made by Python, this program does not rewrite in other units."""
-UNDECIDED = {("sticking 0", "kinematics"): "friction at rates that are rounding has their sign"}
+UNDECIDED = {
+    ("sticking 0", "kinematics"): "friction at rates that are rounding has their sign",
+    ("car.toml", "singularities"): "its driver is along an angle of a body, which is no curve of a linear model",
+}
 """Other analyses that may differ, and why."""
 
 

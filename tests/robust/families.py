@@ -269,10 +269,10 @@ def couplings(d: Dice) -> Case:
 
 
 def curves(d: Dice) -> Case:
-    """Points on curves, flat-faced cams, nonlinear constraints."""
+    """Points on curves, flat-faced cams, linear actuators, nonlinear constraints."""
     case, m = _case(d, "curves", 0.5)
     tree(d, m, case, d.whole(1, 3), kinds=["Revolute", "Prismatic", "PointOnCurve"])
-    close(d, m, case, d.whole(0, 2), kinds=["FlatFacedCam", "PointOnCurve", "Cam"])
+    close(d, m, case, d.whole(0, 2), kinds=["FlatFacedCam", "PointOnCurve", "LinearActuator", "Cam"])
     for k in range(d.whole(0, 2)):
         case.add(lambda k=k: coupling(d, m, f"C{k}", ("Constraint", "Coupler")))
     dress(d, m, case, most=2)

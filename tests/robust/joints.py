@@ -137,17 +137,14 @@ SPATIAL = {
     "PointOnCurve": _point_on_curve,
 }
 COUPLINGS = ("GearPair", "RackAndPinion", "Coupler", "Constraint")
-CURVED = (
-    "FlatFacedCam",
-    "PointOnCurve",
-    "Constraint",
-)  # of the family of curves alone: seeds of others keep their meaning
+NEW_KINDS = ("FlatFacedCam", "PointOnCurve", "LinearActuator", "Constraint")
+"""Kinds of the family of curves alone, so that the seeds of other families keep their meaning."""
 
 
 def joint(d: Dice, name: str, i: str, j: str, p, kinds=None):
     """A joint of a random kind (or of one of ``kinds``) between two bodies, closed at p as drawn."""
     makers = PLANAR if d.planar else SPATIAL
-    return makers[d.pick(kinds or [k for k in makers if k not in CURVED])](d, name, i, j, p)
+    return makers[d.pick(kinds or [k for k in makers if k not in NEW_KINDS])](d, name, i, j, p)
 
 
 def coordinates(m: fb.Mechanism, ending: str = "") -> list[str]:
@@ -165,7 +162,7 @@ def rotations(m: fb.Mechanism) -> list[str]:
 def coupling(d: Dice, m: fb.Mechanism, name: str, kinds=None):
     """A coupling between joints that are there, or None if there are too few."""
     angles, slides, both = coordinates(m, ".angle"), coordinates(m, ".displacement"), coordinates(m)
-    kind = d.pick(kinds or [k for k in COUPLINGS if k not in CURVED])
+    kind = d.pick(kinds or [k for k in COUPLINGS if k not in NEW_KINDS])
     if kind == "GearPair" and len(angles) > 1:
         one, two = (c.removesuffix(".angle") for c in d.random.sample(angles, 2))
         return fb.GearPair(name, one, two, teeth=(d.whole(10, 60), d.whole(10, 60)), internal=d.chance(0.3))
