@@ -76,8 +76,10 @@ def test_coordinates_and_their_derivatives(where, name):
     own = joint.element.measured(where == "plane")
     for what in own:
         value, rate, second = joint._measure(what, True)
-        assert at_moments(rate) == pytest.approx(difference(value), rel=1e-8, abs=1e-7)
-        assert at_moments(second) == pytest.approx(difference(rate), rel=1e-7, abs=1e-6)
+        # arc lengths of a curve are exact at the nodes of its spline, whose third derivatives jump
+        close = (1e-6, 1e-3) if name == "PointOnCurve" else (1e-8, 1e-7)
+        assert at_moments(rate) == pytest.approx(difference(value), rel=close[0], abs=1e-7)
+        assert at_moments(second) == pytest.approx(difference(rate), rel=close[1], abs=1e-6)
         start = joint.element.offset(r.values.numbers["J"], what)
         start += AS_DRAWN[name](joint.element.at) if name in AS_DRAWN else 0.0
         assert value[0] == pytest.approx(start, abs=1e-12), "as drawn"

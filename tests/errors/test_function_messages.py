@@ -79,9 +79,9 @@ def test_only_laws_may_be_functions():
     with pytest.raises(ModelError, match="Body 'b': field 'mass' must be a number or a text, got <function"):
         fb.Body("b", mass=misspelt)
     with pytest.raises(
-        ModelError, match="Motor 'm': field 'torque' must be a number or a text or a function, got None"
+        ModelError, match="Actuator 'm': field 'force' must be a number or a text or a function, got None"
     ):
-        fb.Motor("m", "A", torque=None)
+        fb.Actuator("m", "A.angle", force=None)
 
 
 def test_a_model_file_holds_no_functions():

@@ -122,7 +122,7 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
 
 def _refuse_friction_on_curve(model: Model, e: Any) -> None:
     """Refuse friction along a curve in space: the load of a joint is computed for one axis."""
-    for text in e.along():
+    for text in e.along() if isinstance(e, CoordinateForce) else ():
         joint, what = model.coordinate(text, e)
         if joint.coordinates[what].row.of_kind.place:
             raise ModelError(
