@@ -26,10 +26,10 @@ def law(t, side):
 
 
 CASES = {
-    "no prefix": (part(), {}, "prefix is None; give a word"),
-    "no word": (part(), {"prefix": "a b"}, "prefix is 'a b'; give a word"),
-    "reserved": (part(), {"prefix": "ground"}, "prefix is 'ground'"),
-    "of a part": (part(), {"prefix": "base"}, "prefix is 'base'; give a word that no other group or part has"),
+    "no prefix": (part(), {}, "prefix is None; give one word"),
+    "no word": (part(), {"prefix": "a b"}, "prefix is 'a b'; give one word"),
+    "reserved": (part(), {"prefix": "ground"}, "prefix 'ground' is taken by flyball"),
+    "of a part": (part(), {"prefix": "base"}, "prefix 'base' is taken by Body 'base'; give another word"),
     "no body": (part(), {"prefix": "p", "on": "bass"}, r"no body named 'bass' \(did you mean 'base'\?\)"),
     "unknown parameter": (
         part(parameters={"stiffness": 1}), {"prefix": "p", "parameters": {"stifness": 2}},

@@ -39,10 +39,12 @@ def add_subassembly(
     """Add a copy of a mechanism: see `Model.add`. Return the last part added."""
     place = _placement(whole, part, at, orientation, angle, mirror)
     who = f"the copy of {part.name!r}"
-    if not isinstance(prefix, str) or not is_plain(prefix) or prefix in (*whole.groups, *whole.by_name, *RESERVED):
-        raise ModelError(
-            f"{who}: prefix is {prefix!r}; give a word that no other group or part has, such as prefix='left'"
-        )
+    if not isinstance(prefix, str) or not is_plain(prefix):
+        raise ModelError(f"{who}: prefix is {prefix!r}; give one word of letters, digits and _, such as prefix='left'")
+    if prefix in (*whole.groups, *whole.by_name, *RESERVED):
+        found = whole.find(prefix)
+        owner = found.title if found else "flyball" if prefix in RESERVED else "another group of parts"
+        raise ModelError(f"{who}: prefix {prefix!r} is taken by {owner}; give another word")
     if on != GROUND:
         whole.body(on, Frame(prefix, on))
     unknown = [k for k in parameters or {} if k not in part.parameters]
