@@ -107,6 +107,60 @@ def test_refused_motors(fields, why):
         arm(fb.Motor("M", "A", **fields))
 
 
+@pytest.mark.parametrize("planar", [True, False])
+def test_actuator_of_given_speed_switched_by_events(planar):
+    """20 N on 4 kg until 0.5 m/s; switched off it slows down by 2 N; switched on again it makes up for that."""
+
+    def p(x, y):
+        return (x, y) if planar else (x, y, 0.0)
+
+    m = fb.Mechanism("carriage", planar=planar, gravity=p(0, 0), parameters={"on": 1.0})
+    m.add(fb.Body("carriage", mass=4, inertia=0.1 if planar else (0.1,) * 3))
+    m.add(fb.Prismatic("guide", "ground", "carriage", at=p(0, 0), axis=p(1, 0)))
+    m.add(fb.Actuator("drive", "guide.displacement", speed="0.5 m/s", limit="on*20"))
+    m.add(fb.Brake("rubbing", "guide.displacement", capacity="2 N"))
+    m.add(fb.Event("off", "t > 1", do=[fb.Set("on", 0)]), fb.Event("on", "t > 1.5", do=[fb.Set("on", 1)]))
+    r = m.simulate(3, outputs=301)
+    reached, slow = 0.5 / (18 / 4), 0.5 - 2 / 4 * 0.5
+    regained = 1.5 + (0.5 - slow) / (18 / 4)
+    speed = np.select(
+        [r.t < reached, r.t < 1, r.t < 1.5, r.t < regained],
+        [4.5 * r.t, 0.5, 0.5 - 0.5 * (r.t - 1), slow + 4.5 * (r.t - 1.5)],
+        0.5,
+    )
+    assert r["drive.rate"] == pytest.approx(speed, abs=1e-9)
+    steady = (r.t > regained + 1e-6) | ((r.t > reached + 1e-6) & (r.t < 1))
+    assert r["drive.force"][steady] == pytest.approx(2.0, abs=1e-7)
+    assert r["drive.force"][(r.t > 1) & (r.t < 1.5)] == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(r["energy.balance"]).max() < 1e-8
+
+
+def test_refused_actuators():
+    for fields, why in (
+        ({}, "neither force nor speed"),
+        ({"force": 1, "speed": 1}, "both given"),
+        ({"speed": "3 rad/s"}, "speed of Actuator 'D'"),
+        ({"speed": 1, "limit": "2 N*m"}, "N"),
+    ):
+        m = fb.Mechanism("m", planar=True)
+        m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("g", "ground", "b", at=(0, 0), axis=(1, 0)))
+        with pytest.raises(ModelError, match=why):
+            m.add(fb.Actuator("D", "g.displacement", **fields))
+    with pytest.raises(ModelError, match="speed is that of one coordinate"):
+        arm(fb.Actuator("D", ["A.angle"], weights=[2], speed=1))
+
+
+def test_cylinder_of_given_speed():
+    """A cylinder that extends at 0.1 m/s whatever it lifts, and up to a force."""
+    m = fb.Mechanism("hoist", planar=True, gravity=(0, -G))
+    m.add(fb.Body("load", mass=10, inertia=0.1, position=(0, 1)))
+    m.add(fb.Prismatic("guide", "ground", "load", at=(0, 0), axis=(0, 1)))
+    m.add(fb.LinearActuator("C", "ground", "load", at=((0, 0), (0, 1)), speed="0.1 m/s", limit="200 N"))
+    r = m.simulate(1)
+    assert r["C.length_rate"][-1] == pytest.approx(0.1, abs=1e-9)
+    assert r["C_drive.force"][-1] == pytest.approx(10 * G, rel=1e-7)
+
+
 LOAD, DRUM, RADIUS = 10.0, 0.2, 0.1
 
 

@@ -76,11 +76,11 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .bushing import Bushing as Bushing
     from .clutch import Brake as Brake
     from .clutch import Clutch as Clutch
-    from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
     from .detent import Detent as Detent
     from .joint_friction import JointFriction as JointFriction
     from .limit import Limit as Limit
+    from .motor import Actuator as Actuator
     from .motor import Motor as Motor
     from .one_way import OneWay as OneWay
     from .one_way import Ratchet as Ratchet

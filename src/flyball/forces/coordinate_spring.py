@@ -1,4 +1,4 @@
-"""Spring, damper and actuator along any coordinate."""
+"""Spring and damper along any coordinate."""
 
 from __future__ import annotations
 
@@ -83,39 +83,6 @@ class CoordinateSpring(WeightedSumForce, CoordinateForce):
 def measuring_spring(e: Any) -> CoordinateSpring:
     """Return a spring of zero stiffness, whose only purpose is to measure the quantity along which an element acts."""
     return CoordinateSpring(e.name, e.coordinate, weights=e.weights)
-
-
-@element
-class Actuator(WeightedSumForce, CoordinateForce):
-    """A force or torque along a coordinate by a law: a hydraulic cylinder in a prismatic joint, a controller.
-
-    Parameters
-    ----------
-    name : str
-    coordinate : str or list of str
-        ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
-        With ``weights`` a list: the element acts along their sum.
-    weights : list of numbers
-        One for each of several coordinates; the first without unit, so that the sum has the first coordinate's unit.
-    force : law [N] or [N m]
-        An expression of ``t``, ``value``, ``rate``, sensors and parameters: ``"kp*(0.2 - value) - kd*rate"``.
-    """
-
-    coordinate: Coordinates = field(kw_only=False)
-    force: Annotated[Law, LawOf(None, ("value", "rate"))]
-    weights: Annotated[Numbers | None, Unit(None)] = None
-
-    kind: ClassVar[int] = KIND
-    effort: ClassVar = staticmethod(effort)
-    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
-
-    def check(self, n: SimpleNamespace) -> None:
-        """Require weights for a sum of coordinates."""
-        self.check_weights_given(n)
-
-    def laws(self) -> tuple[Law | None, ...]:
-        """Return the force law."""
-        return (self.force,)
 
 
 def refuse_without_stiffness(e: Any, name: str, usual: float | None) -> None:

@@ -26,8 +26,8 @@ class LinearActuator(Joint):
 
     It constrains nothing by itself: its coordinate ``length`` is the distance of the two points. Drivers, limits,
     springs, brakes, sensors, controllers, events and laws use it as any coordinate: ``Limit("stroke", "boom.length",
-    lower="0.8 m", upper="1.3 m")`` are the ends of its stroke. With ``length`` it is driven, with ``force`` it pushes;
-    with neither it measures, or rests on what else acts along its coordinate.
+    lower="0.8 m", upper="1.3 m")`` are the ends of its stroke. With ``length`` or ``speed`` it is driven, with
+    ``force`` it pushes; with none of them it measures, or rests on what else acts along its coordinate.
 
     Without masses the force acts on the two bodies directly. With ``barrel`` and ``rod`` it acts between these two
     bodies, along their slide, and the pins at their ends carry it.
@@ -44,6 +44,8 @@ class LinearActuator(Joint):
     force : law [N]
         Force that pushes the ends apart, an expression of ``t``, ``value`` (the length), ``rate``, sensors and
         parameters, as of an `Actuator`.
+    speed, limit : law [m/s], law [N]
+        Speed at which the ends move apart, and the largest force with which it keeps that speed, as of an `Actuator`.
     barrel, rod : shape or list of shapes
         Shapes with a mass or density, of two bodies between the ends: the barrel on ``body_i``, the rod on ``body_j``.
         The reference frame of either has its origin at its end, and its x axis points to the other end.
@@ -58,6 +60,8 @@ class LinearActuator(Joint):
     at: PointPair | None = None  # type: ignore[assignment]
     length: Annotated[Law | None, LawOf("m")] = None
     force: Annotated[Law | None, LawOf("N", ("value", "rate"))] = None
+    speed: Law | None = None
+    limit: Law | None = None
     barrel: Shapes = None
     rod: Shapes = None
 
@@ -69,11 +73,14 @@ class LinearActuator(Joint):
 
     def check(self, n: SimpleNamespace) -> None:
         """Require one law at most, either both masses or none, and different ends."""
-        if self.length is not None and self.force is not None:
+        laws = [k for k in ("length", "force", "speed") if getattr(self, k) is not None]
+        if len(laws) > 1:
             raise ModelError(
-                f"{self.title}: length and force are both given, and a prescribed length determines the force; leave "
-                "one out"
+                f"{self.title}: {laws[0]} and {laws[1]} are both given, and a prescribed motion determines the "
+                "force; leave one out"
             )
+        if self.limit is not None and self.speed is None:
+            raise ModelError(f"{self.title}: limit is the largest force of a given speed; give speed=, or leave it out")
         if (self.barrel is None) != (self.rod is None):
             missing, given = ("barrel", "rod") if self.barrel is None else ("rod", "barrel")
             raise ModelError(f"{self.title}: it has a {given} and no {missing}; give both, or neither")
@@ -88,10 +95,10 @@ class LinearActuator(Joint):
         coordinate, drive = f"{self.name}_slide.displacement" if masses else f"{self.name}.length", f"{self.name}_drive"
         if self.length is not None:
             return (*masses, Driver(drive, coordinate, self.length))
-        if self.force is None:
+        if self.force is None and self.speed is None:
             return masses
         actuator: Any = Element.of_type("Actuator")  # forces are not known here
-        return (*masses, actuator(drive, coordinate, force=self.force))
+        return (*masses, actuator(drive, coordinate, force=self.force, speed=self.speed, limit=self.limit))
 
     def _telescope(self, planar: bool) -> tuple[Element, ...]:
         """Return barrel, rod, and the joints at the ends and between them."""

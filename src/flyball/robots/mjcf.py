@@ -14,7 +14,8 @@ import numpy as np
 
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
-from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.coordinate_spring import CoordinateSpring
+from ..forces.motor import Actuator
 from ..forces.rotor_inertia import RotorInertia
 from ..joints.fixed import Fixed
 from ..joints.prismatic import Prismatic

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..forces.clutch import Brake
-from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.coordinate_spring import CoordinateSpring
 from ..forces.limit import Limit
+from ..forces.motor import Actuator
 from ..forces.path_spring import PathSpring
 from ..forces.rope import Rope
 from ..forces.rotor_inertia import RotorInertia

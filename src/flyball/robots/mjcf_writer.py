@@ -17,9 +17,9 @@ import numpy as np
 
 from ..errors import ModelError, ModelWarning, warn_user
 from ..forces.clutch import Brake
-from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.coordinate_spring import CoordinateSpring
 from ..forces.limit import Limit
-from ..forces.motor import Motor
+from ..forces.motor import Actuator, Motor
 from ..forces.path_spring import PathSpring
 from ..forces.rope import Rope
 from ..forces.rotor_inertia import RotorInertia

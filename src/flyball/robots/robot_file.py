@@ -14,9 +14,9 @@ from xml.parsers import expat
 import numpy as np
 
 from ..errors import ModelError
-from ..forces.coordinate_spring import Actuator, CoordinateSpring
+from ..forces.coordinate_spring import CoordinateSpring
 from ..forces.limit import Limit
-from ..forces.motor import Motor
+from ..forces.motor import Actuator, Motor
 from ..forces.path_spring import PathSpring
 from ..forces.spring_damper import SpringDamper
 from ..model.body import Initial
