@@ -29,7 +29,7 @@ from ..tables.law_inputs import initial_controller_states
 from ..tables.reference_configuration import BodyState, positions
 from ..tables.structure import Choices, structure
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import System, Work, assign
+from ..tables.table_definitions import System, Work, assign, with_numbers
 from ..tables.values import Values, values
 
 
@@ -42,16 +42,17 @@ class CompiledMechanism:
     parameters: dict[str, Any] = field(default_factory=dict)  # values that replace the model's own
     system: System = field(init=False, repr=False, compare=False)  # tables of `values`, or with addresses of `made`
     generated: Any = field(default=None, init=False, repr=False, compare=False)  # generated code; None: general engine
+    _complex: Any = field(default=None, init=False, repr=False, compare=False)  # see `complex_tables`
 
     def __post_init__(self) -> None:
         self.system = self.values.system
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without workspace and addresses, which are invalid in another process."""
-        return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "generated")}
+        return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "generated", "_complex")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, system=state["values"].system, generated=None)
+        vars(self).update(state, system=state["values"].system, generated=None, _complex=None)
 
     def run_on(self, code: Any) -> None:
         """Use generated code from now on, as far as it replaces the engine; the contents of the workspace are kept."""
@@ -81,6 +82,15 @@ class CompiledMechanism:
         made = pooled_work(self.structure, self.system, self.system.const.dtype)
         made.array("options").stabilization, made.array("options").solve_tolerance = NONE, 1e-13
         return made
+
+    @property
+    def complex_tables(self) -> tuple[StructBuffer, PooledBuffer]:
+        """Tables in complex numbers, and a workspace for them, as compiled code takes them."""
+        real = self.values.system
+        if self._complex is None or self._complex[0] is not real:
+            system = with_numbers(real, lambda _, x: x.astype(complex))
+            self._complex = real, struct_tables(self.structure, system), pooled_work(self.structure, system, complex)
+        return self._complex[1:]  # type: ignore[no-any-return]
 
     def array(self, name: str) -> Any:
         """Return an array of the workspace, without creating the others."""

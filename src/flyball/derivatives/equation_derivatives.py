@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
-from ..engine.entry_point import MOTION, allocate_work
+from ..compiler.kernels import StructBuffer
+from ..engine.entry_point import MOTION, pooled_work
 from ..engine.kinematics import count_plain_coordinates, retract
 from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
@@ -33,7 +34,7 @@ from ..laws.bytecode import BY_TIME, evaluate_jet
 from ..numerics.rank import fundamental_subspaces
 from ..tables.coordinate_choice import require_rotor_coordinates
 from ..tables.structure_definition import Structure
-from ..tables.table_definitions import ALONG, SLIDING, System, Work, with_numbers
+from ..tables.table_definitions import ALONG, SLIDING, System, with_numbers
 from ..tables.values import Values, values
 
 COMPLEX_STEP = 1e-40
@@ -65,21 +66,8 @@ def complex_system(system: System) -> System:
     return with_numbers(system, lambda _, x: x.astype(complex))
 
 
-def complex_tables(c: CompiledMechanism) -> tuple[System, Work]:
-    """Tables and work arrays in complex numbers."""
-    system = complex_system(c.values.system)
-    return system, allocate_work(c.structure, system, complex)
-
-
-def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.ndarray:
-    """F (nv, rows), the part that joint friction adds to -G^T in the derivatives of r by the multipliers.
-
-    Parameters
-    ----------
-    x : MechanismState
-    system, W : System, Work
-        The tables and work arrays of the state in complex numbers.
-    """
+def friction_by_multipliers(x: MechanismState) -> np.ndarray:
+    """F (nv, rows), the part that joint friction adds to -G^T in the derivatives of r by the multipliers."""
     s = x.c.structure
     nv, nr = s.nv, len(s.rows)
     out = np.zeros((nv, nr))
@@ -90,7 +78,7 @@ def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.nd
     for k in rows.tolist():
         lam = x.lam.astype(complex)
         lam[k] += 1j * COMPLEX_STEP
-        evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, found)
+        evaluate_residuals(*x.c.complex_tables, complex(x.t), y, vdot, lam, steps, found)
         out[:, k] = complex_step_derivative(found[0, :nv])
     if len(rows):
         x.c.at(x.t, x.q, x.v)
@@ -101,8 +89,8 @@ def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.nd
     return out
 
 
-def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
-    """Whether joint friction makes dr/dlam differ from -G^T; arguments as in `friction_by_multipliers`."""
+def has_reaction_friction(x: MechanismState) -> bool:
+    """Whether joint friction makes dr/dlam differ from -G^T."""
     s = x.c.structure
     nv, nr = s.nv, len(s.rows)
     x.c.at(x.t, x.q, x.v)
@@ -112,7 +100,7 @@ def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
     steps = np.zeros((1, 3 * nv + 1), complex)
     found = np.zeros((1, nv + 3 * nr + 3 * len(s.measured)), complex)
     y, vdot, lam = x.y.astype(complex), x.vdot.astype(complex), x.lam + 1j * COMPLEX_STEP * random
-    evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, found)
+    evaluate_residuals(*x.c.complex_tables, complex(x.t), y, vdot, lam, steps, found)
     left = complex_step_derivative(found[0, :nv]) + G.T @ random
     return bool((np.abs(left) > COUPLING_LIMIT * (abs(G).T @ random)).any())
 
@@ -247,6 +235,15 @@ class EquationDerivatives:
         return self._jacobian(1)
 
     @cached_property
+    def constraint_jacobian(self):
+        """Jacobian G of all constraints, sparse (rows, nv): the rows n of `by_velocity`."""
+        x = self.state
+        x.c.at(x.t, x.q, x.v)
+        G = x.c.sparse_jacobian()
+        G.eliminate_zeros()
+        return G
+
+    @cached_property
     def by_acceleration(self):
         """Derivatives by accelerations, sparse (width, nv): the mass matrix in the rows of r."""
         return self._jacobian(2)
@@ -276,7 +273,7 @@ class EquationDerivatives:
     @cached_property
     def by_reactions(self) -> np.ndarray:
         """Derivatives of r by the multipliers besides -G^T (nv, rows): the part F of joint friction."""
-        return friction_by_multipliers(self.state, *self.complex_tables)
+        return friction_by_multipliers(self.state)
 
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model at fixed state, (width,)."""
@@ -301,32 +298,28 @@ class EquationDerivatives:
         system.const[list(c.structure.model.parameters).index(name)] += 1j * COMPLEX_STEP
         return replace(c.values, system=system)
 
-    @cached_property
-    def complex_tables(self) -> tuple[System, Work]:
-        """Tables and work arrays of the state in complex numbers."""
-        return complex_tables(self.state.c)
-
     def _steps(self, count: int) -> np.ndarray:
         """Zero steps: of positions, velocities, accelerations, time and controller states."""
         return np.zeros((count, 3 * self.state.c.structure.nv + 1 + self.nz), complex)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        S, W = (
-            self.complex_tables if system is None else (system, allocate_work(self.state.c.structure, system, complex))
-        )
+        s = self.state.c.structure
+        S, W = self.state.c.complex_tables
+        if system is not None:
+            S, W = StructBuffer(system), pooled_work(s, system, complex)
         out = self.residuals(self.state, steps, S, W)
         if not np.isfinite(out.view(float)).all():
-            raise self._not_finite(W.stack)
+            raise self._not_finite(W.array("stack"))
         return out
 
-    def residuals(self, x: MechanismState, steps: np.ndarray, system: System, W: Work) -> np.ndarray:
+    def residuals(self, x: MechanismState, steps: np.ndarray, system: StructBuffer, W: StructBuffer) -> np.ndarray:
         """Residuals at steps from a state, by tables in complex numbers, (steps, width); without efforts."""
         s = x.c.structure
         if s.sampled:  # the laws of sampled states in place of their zero rates
-            laws = system.control_laws.copy()
+            laws = system.fields.control_laws.copy()
             for _, k, law, _ in s.sampled:
                 laws[k] = law
-            system = system._replace(control_laws=laws)
+            system = system.of(system.fields._replace(control_laws=laws))
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
         out = np.zeros((len(steps), self.width), complex)
         evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, out)
@@ -487,10 +480,10 @@ ROUNDING_MARGIN = 8.0  # differences below so many times the spread of the sampl
 
 def force_magnitudes(e: EquationDerivatives) -> np.ndarray:
     """Magnitude of the forces in every equation of motion: total force plus each reaction, (nv,)."""
-    x, at = e.state, e.at
-    G = e.by_velocity[at["n"]]
-    M = e.by_acceleration[at["r"]]
-    force = e.residual[at["r"]] - M @ x.vdot + G.T @ x.lam
+    x, r, G = e.state, e.at["r"], e.constraint_jacobian
+    force = e.residual[r] + G.T @ x.lam
+    if x.vdot.any():
+        force = force - e.by_acceleration[r] @ x.vdot
     return np.abs(force) + abs(G).T @ np.abs(x.lam) + np.abs(x.effort)
 
 

@@ -265,6 +265,17 @@ def minimum_norm_solution(A, b: np.ndarray) -> np.ndarray:
 
 
 def _dense_solver(A) -> Callable[[np.ndarray], np.ndarray]:
+    """Solver by QR with column pivoting where A has full rank, by singular values elsewhere."""
+    from scipy.linalg import qr, solve_triangular
+
+    wide = A.shape[0] < A.shape[1]
+    Q, R, order = qr(A.T if wide else A, mode="economic", pivoting=True)
+    d = np.abs(np.diagonal(R))
+    if d.size and d[-1] > SINGULAR_VALUE_LIMIT * d[0]:
+        back = np.argsort(order)
+        if wide:
+            return lambda b: Q @ solve_triangular(R, b[order], trans="T")
+        return lambda b: solve_triangular(R, Q.T @ b)[back]
     U, d, Vt = np.linalg.svd(A, full_matrices=False)
     k = int((d > SINGULAR_VALUE_LIMIT * d.max(initial=0.0)).sum())
     return lambda b: Vt[:k].T @ ((U[:, :k].T @ b) / d[:k])

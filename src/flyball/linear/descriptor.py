@@ -141,7 +141,7 @@ class SparseEquations:
         import scipy.sparse as sp
 
         e = EquationDerivatives(x)
-        if x.c.structure.loads and has_reaction_friction(x, *e.complex_tables):
+        if x.c.structure.loads and has_reaction_friction(x):
             raise AnalysisError(
                 f"{x.c.structure.model.name!r} has {len(x.v)} velocities, and friction that follows its joints' "
                 f"reactions; linear equations of so large a mechanism are made without such friction only"

@@ -32,18 +32,18 @@ from ..assembly.positions_and_velocities import (
     row_scales,
     velocity_deviation,
 )
+from ..compiler.kernels import StructBuffer
 from ..derivatives.equation_derivatives import (
     COMPLEX_STEP,
     EquationDerivatives,
     MechanismState,
     complex_step_derivative,
     complex_system,
-    complex_tables,
     friction_by_multipliers,
     refuse_undetermined_friction,
 )
 from ..derivatives.equation_derivatives import COMPLEX_STEP as COMPLEX
-from ..engine.entry_point import allocate_work
+from ..engine.entry_point import pooled_work
 from ..engine.kinematics import BodyKinematicsOverTime, joint_velocities, retract
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
@@ -203,8 +203,8 @@ class ParameterDirection:
     def __init__(self, e: EquationDerivatives, name: str) -> None:
         self.name = name
         self.values: Values = e.stepped(name)
-        self.system = complex_system(self.values.system)
-        self.work = allocate_work(e.state.c.structure, self.system, complex)
+        system = complex_system(self.values.system)
+        self.tables = StructBuffer(system), pooled_work(e.state.c.structure, system, complex)
         self.e = e
 
     @staticmethod
@@ -215,7 +215,7 @@ class ParameterDirection:
     def along(self, x: MechanismState, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """Derivatives (width,) of all residuals at x along changes of positions, velocities and the parameter."""
         steps = 1j * COMPLEX_STEP * np.r_[dq, dv, np.zeros(len(dq) + 1 + self.e.nz)][None]
-        return complex_step_derivative(self.e.residuals(x, steps, self.system, self.work)[0])
+        return complex_step_derivative(self.e.residuals(x, steps, *self.tables)[0])
 
 
 class ConstrainedSystem:
@@ -268,7 +268,7 @@ class ConstrainedSystem:
 def reaction_friction(x: MechanismState, G: np.ndarray) -> np.ndarray:
     """Derivatives F (nv, rows) of joint friction by the reactions; refused where these are undetermined."""
     s = x.c.structure
-    F = friction_by_multipliers(x, *complex_tables(x.c))
+    F = friction_by_multipliers(x)
     scale = x.c.sizes / x.c.values.length
     refuse_undetermined_friction(s, G * scale, scale[:, None] * F)
     return F

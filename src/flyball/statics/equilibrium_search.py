@@ -79,6 +79,7 @@ def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> 
 
 
 NEWTON_STEPS, DESCENT_STEPS = 40, 400  # largest numbers of steps
+STAGNATION = 10  # limited steps of Newton's method that do not halve the residual, after which it has failed
 # Travel [rad, or lengths of the mechanism] after which the search has failed.
 MAX_TRAVEL = 15.0
 LAST_STEP = 1e-7  # size of Newton's last step: the error after it is about its square
@@ -90,9 +91,11 @@ FORCE_TOLERANCE = 1e-9  # residual force relative to the applied forces
 GAP_TOLERANCE = 1e-10  # residual gap relative to the mechanism's length
 LEAST_DAMPING, FIRST_DAMPING, MAX_DAMPING = (
     1e-8,
-    1e2,
+    1.0,
     1e8,
 )  # damping at which Newton's method takes over, at the start of descent, and at failure
+# Where the residual after a step differs from the linear prediction by less than this part, damping falls fast.
+WELL_PREDICTED, FAST_DECREASE = 0.2, 0.1
 
 
 def newton_search(x: RestState) -> RestState | None:
@@ -108,10 +111,14 @@ def newton_search(x: RestState) -> RestState | None:
 
 def newton_search_to(x: RestState) -> tuple[RestState | None, RestState]:
     """Like `newton_search`; returns also the last state."""
+    best_residual, stagnant = np.inf, 0
     for _ in range(NEWTON_STEPS):
         step, lam = x.step()
         longest = np.abs(step).max(initial=0.0)
-        if not np.isfinite(longest):
+        residual = x.residual_size()
+        stagnant = stagnant + 1 if longest > LONGEST_STEP and residual > 0.5 * best_residual else 0
+        best_residual = residual if stagnant == 0 else best_residual
+        if not np.isfinite(longest) or stagnant >= STAGNATION:
             break
         x = _after_long_step(x, step, lam) or x.moved(step * min(1.0, LONGEST_STEP / max(longest, 1e-300)), lam)
         if longest < LAST_STEP and (best := equilibrium_there(x)):
@@ -177,25 +184,34 @@ def perturbed_along_softest(x: RestState, changed: RestState | None = None) -> R
 def pseudo_transient_descent(x: RestState) -> RestState | None:
     """Pseudo-transient continuation along the constraints; None if it fails."""
     x = x.closed()
-    damping, left, way = FIRST_DAMPING, np.abs(x.r).max(initial=0.0), 0.0
+    damping, way = FIRST_DAMPING, 0.0
     for _ in range(DESCENT_STEPS):
-        if damping < LEAST_DAMPING or x.settled(FORCE_TOLERANCE):
+        if damping < LEAST_DAMPING or _may_rest(x):
             return x
         step, lam = x.step(damping)
         longest = np.abs(step).max(initial=0.0)
         along = float(step @ -x.r)
         if not along > 0.0 or longest > LONGEST_STEP:  # against the forces, or too long
-            damping *= 4.0
+            damping *= min(max(2.0 * longest / LONGEST_STEP, 2.0), 10.0)
             if damping > MAX_DAMPING:
                 return None
             continue
         way += longest
         if way > MAX_TRAVEL:
             return None
+        before, predicted = np.abs(x.r).max(initial=0.0), -damping * x.size * step
         x = x.moved(step, lam).closed()
-        before, left = left, np.abs(x.r).max(initial=0.0)
-        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+        left = np.abs(x.r).max(initial=0.0)
+        if np.abs(x.r - predicted).max(initial=0.0) < WELL_PREDICTED * left:
+            damping *= max(FAST_DECREASE, longest / LONGEST_STEP)
+        else:
+            damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
     return None
+
+
+def _may_rest(x: RestState) -> bool:
+    """Whether all residuals are settled; rounding is computed only where the largest is small."""
+    return x.residual_size() < NEARLY_LINEAR**2 and x.settled(FORCE_TOLERANCE)
 
 
 def pseudo_transient_search(x: RestState) -> tuple[RestState | None, RestState]:
@@ -207,7 +223,7 @@ def pseudo_transient_search(x: RestState) -> tuple[RestState | None, RestState]:
     x = x.closed()
     damping, left = FIRST_DAMPING, x.residual_size()
     for _ in range(DESCENT_STEPS):
-        if damping < LEAST_DAMPING or x.settled(FORCE_TOLERANCE):
+        if damping < LEAST_DAMPING or _may_rest(x):
             return x, x
         step, lam = x.step(damping)
         longest = np.abs(step).max(initial=0.0)

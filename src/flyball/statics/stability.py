@@ -105,14 +105,14 @@ class RestState:
         """Jacobian of all constraints, including those on velocities, with unit rows; sparse."""
         import scipy.sparse as sp
 
-        G = self.equations.by_velocity[self.equations.at["n"]]
+        G = self.equations.constraint_jacobian
         G = sp.diags(self.row_scale) @ G @ sp.diags(self.c.sizes)
         return sp.hstack([G, sp.csr_matrix((G.shape[0], len(self.z)))]).tocsr() if len(self.z) else G
 
     @cached_property
     def row_scale(self) -> np.ndarray:
         """Factors that scale the rows to unit norm."""
-        G = self.equations.by_velocity[self.equations.at["n"]]
+        G = self.equations.constraint_jacobian
         size = np.sqrt(np.asarray((G.multiply(G)) @ (self.c.sizes**2)).ravel())
         return 1.0 / np.where(size > 0.0, size, 1.0)
 
