@@ -184,6 +184,41 @@ def singular_passage_warnings(result: Result) -> list[str]:
     return found
 
 
+APPROACH_GROWTH = 2.0  # growth of the fastest velocity over the times that are examined
+APPROACH_FIT = 0.05  # allowed deviation of 1 / v^2 from a line, relative to its first value
+APPROACH_OUTPUTS = 5  # least number of output times among them
+
+
+def lock_up_warning(result: Result) -> str:
+    """Return a warning if velocities grow at the end as they do before a position where drivers lock the mechanism.
+
+    There a driver has a largest or least value, which the motion reaches at a time T with a finite rate: positions
+    change with the root of T - t, and velocities v as (T - t)^(-1/2), so that 1 / v^2 falls linearly to zero. The times
+    examined are the last, in which the fastest velocity has doubled: a steady or exponential growth is no line.
+    """
+    if not result.model.drivers or len(result.t) <= APPROACH_OUTPUTS or not result.v.shape[1]:
+        return ""
+    names = velocity_names(result.values.structure)
+    sizes = np.array([result.values.length if n.unit == "m" else 1.0 for n in names])
+    k = int(np.argmax(np.abs(result.v[-1]) / sizes))
+    v = np.abs(result.v[:, k])
+    slower = np.flatnonzero(v * APPROACH_GROWTH <= v[-1])
+    first = int(slower[-1]) if len(slower) else len(v)
+    t, w = result.t[first:], v[first:]
+    if len(t) < APPROACH_OUTPUTS or not w[0] > 0.0 or not t[-1] > t[0]:
+        return ""
+    share = (w[0] / w) ** 2
+    line = 1.0 + (share[-1] - 1.0) * (t - t[0]) / (t[-1] - t[0])
+    if not np.abs(share - line).max() < APPROACH_FIT:
+        return ""
+    end = t[-1] + share[-1] * (t[-1] - t[0]) / (1.0 - share[-1])
+    return (
+        f"velocities grow as they do before a position that locks: that of {names[k].name!r} from {w[0]:.3g} to "
+        f"{w[-1]:.3g} {names[k].unit}/s since t = {t[0]:.6g} s, and without bound near t = {end:.6g} s. A driver "
+        "prescribes more there than the links allow; m.singularities() shows the limits of its travel"
+    )
+
+
 def orientation_error_warning(result: Result) -> str:
     """Return a warning if steps rotate a body too far for the method's order; nothing otherwise."""
     if not _has_fixed_step(result):
@@ -357,6 +392,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
         *_creep_warnings(result),
         *transverse_slip_warnings(result),
         *singular_passage_warnings(result),
+        lock_up_warning(result),
         *pull_warnings(result),
     ]
     return tuple(text for text in texts if text)
