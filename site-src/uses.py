@@ -64,6 +64,10 @@ USES = {
     "PointForce": 'fb.PointForce("push", "cart", force=(10, 0), at=(0, 0.1))',
     "PointTorque": 'fb.PointTorque("drive", "wheel", torque=5)',
     "Rope": 'fb.Rope("rope", ("ground", "load"), at=((0, 2), (0, 0)), stiffness="2e5 N/m", damping="200 N*s/m")',
+    "Rubber": (
+        'fb.Rubber("mount", "guide.displacement", stiffness="1e5 N/m", viscous_stiffness=("4e4 N/m",), '
+        'relaxation_times=("10 ms",), friction="50 N", friction_travel="0.4 mm")'
+    ),
     "SpringDamper": (
         'fb.SpringDamper("spring", "ground", "slider", at=((1.2, 0), (0.7, 0)), stiffness=200, damping=1, length=0.5)'
     ),

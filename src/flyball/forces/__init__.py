@@ -21,8 +21,8 @@ for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
 _HERE = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
-ALL = [c for c in _HERE if c.category == Force.category]
-"""Every force element defined in a file of this folder; all are public."""
+ALL = [c for c in _HERE if c.category == Force.category and hasattr(c, "kind")]
+"""Every force element with a formula in a file of this folder; others consist of such elements. All are public."""
 LIMITS = [c for c in _HERE if c.category != Force.category]
 """Every one-sided element: stops, play, latches. Elastic ones act by a formula, as forces do."""
 
@@ -89,6 +89,7 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .point_torque import PointTorque as PointTorque
     from .rope import Rope as Rope
     from .rotor_inertia import RotorInertia as RotorInertia
+    from .rubber import Rubber as Rubber
     from .shear_pin import ShearPin as ShearPin
     from .spring_damper import SpringDamper as SpringDamper
     from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper

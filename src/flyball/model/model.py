@@ -265,13 +265,20 @@ class Model:
             if len(elements) != 1 or not isinstance(elements[0], Model):
                 raise ModelError("prefix=, at=, mirror= and the like are for one mechanism: m.add(part, prefix='left')")
             return add_subassembly(self, elements[0], *placed)
-        vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
-        try:
-            return self._add(*elements)  # type: ignore[arg-type]
-        finally:
-            vars(self).pop("_adding")
+        return self._add(*elements)  # type: ignore[arg-type]
 
     def _add(self, *elements: Element) -> Any:
+        """Add elements; controllers among them may name each other in any order."""
+        before = vars(self).get("_adding", ())
+        vars(self)["_adding"] = (*before, *(e for e in elements if isinstance(e, Controller)))
+        try:
+            return self._add_each(*elements)
+        finally:
+            vars(self)["_adding"] = before
+            if not before:
+                vars(self).pop("_adding")
+
+    def _add_each(self, *elements: Element) -> Any:
         last = None
         for e in elements:
             if not isinstance(e, Element) or e.category not in CATEGORIES:

@@ -399,7 +399,8 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
         for name, pair in e.dimensions.items():
             value = getattr(e, name, None)
             if value is not None and name in fields_with(e.__class__, Unit):
-                number(value, env, pair[turning], f"{name} of {e.title}")
+                for x in value if isinstance(value, tuple) else (value,):
+                    number(x, env, pair[turning], f"{name} of {e.title}")
             elif value is not None and name in fields_with(e.__class__, LawOf):
                 tables = {x.name: x for x in model.tables}
                 names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
