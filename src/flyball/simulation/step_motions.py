@@ -28,8 +28,8 @@ from .integration_options import Integration, Stepping
 from .measurement import Measurement
 from .simulate import clock_for, row_width
 
-HORIZON = 1000  # steps whose duration scales the tolerances of an integration, as the time span of a simulation does
-LOOKAHEAD = 64  # steps for which the breakpoints of laws are found at once
+HORIZON = 1000  # steps whose duration scales the tolerances of an integration, as the time span of a simulation does;
+# breakpoints of laws are found for as many at once
 
 
 POSE_WIDTH = 12  # of a row of `Movers.pose`
@@ -109,7 +109,7 @@ class IntegratedMotion:
         self._timed = bool(laws_of_time(c))
         read = [x.operand for _, steps in laws_of_time(c) for x in steps if x.operation == CONSTANT]
         self._law_inputs = np.intersect1d(self._inputs, np.array(read, np.int64))
-        self._dt, self._known = dt, KnownBreaks(np.inf, -np.inf, b"", NO_BREAKPOINTS)
+        self._ahead, self._known = HORIZON * dt, KnownBreaks(np.inf, -np.inf, b"", NO_BREAKPOINTS)
         self._call = c.bound(tableau(self.method), clock, np.zeros((2, row_width(start.assembly))))
 
     def set_inputs(self, values: np.ndarray) -> None:
@@ -151,8 +151,12 @@ class IntegratedMotion:
         now, inputs = float(self.clock.real.t), self.c.system.const[self._law_inputs].tobytes()
         known = self._known
         if inputs != known.inputs or not known.begin <= now <= t <= known.end:
-            end = max(t, now + LOOKAHEAD * self._dt) if inputs == known.inputs or not known.inputs else t
-            known = self._known = KnownBreaks(now, end, inputs, known_breaks(self.c, now, end))
+            end = max(t, now + self._ahead) if inputs == known.inputs or not known.inputs else t
+            found = known_breaks(self.c, now, end)
+            if found.given_up and end > t:  # they are too many for so long a time
+                self._ahead, end = 0.0, t
+                found = known_breaks(self.c, now, end)
+            known = self._known = KnownBreaks(now, end, inputs, found)
         times = known.found.times
         due = (times >= now) & (times <= t + rounding_margin(t))
         return Breakpoints(times[due], known.found.sharp[due], known.found.given_up)
