@@ -152,6 +152,7 @@ def _header(recording: Recording, block: _NumberBlock) -> dict[str, Any]:
                 "name": b.name,
                 "color": b.color,
                 "opacity": float(b.opacity),
+                "ground": bool(b.ground),
                 "shapes": [_shape_data(s, block) for s in b.shapes],
             }
             | {"p": block.add(b.p), "q": block.add(sign_continuous(b.q))}
