@@ -322,6 +322,8 @@ PLAYER_MODULES = (
     "overlay",
     "variants",
     "compared",
+    "vector",
+    "film",
     "save",
     "main",
 )
@@ -424,6 +426,7 @@ def _module_as_function(name: str, module: str) -> str:
     """Return a module as a function that returns its exports; only its named imports are supported."""
     exported = ", ".join(re.findall(r"^export (?:class|const|function) (\w+)", module, flags=re.M))
     body = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";', r"const \1 = $\2;", module, flags=re.M)
+    body = re.sub(r'^import (\{[^}]*\}) from "\w+";', r"const \1 = LIB;", body, flags=re.M)
     body = re.sub(r"^import .*;\n", "", body, flags=re.M)
     body = re.sub(r"^export ", "", body, flags=re.M)
     return f"const ${name} = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();"
