@@ -304,6 +304,7 @@ PLAYER_MODULES = (
     "trails",
     "crowdshapes",
     "crowd",
+    "batches",
     "mechanism",
     "stage",
     "marks",
