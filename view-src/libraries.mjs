@@ -57,4 +57,5 @@ export { LineMaterial } from "three/addons/lines/LineMaterial.js";
 export { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 export { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 export { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+export { GIFEncoder, applyPalette, quantize } from "gifenc";
 export { default as uPlot } from "uplot";

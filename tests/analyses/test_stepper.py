@@ -68,12 +68,24 @@ def test_a_parameter_of_laws_is_an_input():
     assert np.allclose(y, [run[name][-1] for name in NAMES], rtol=0, atol=1e-8)
 
 
-def test_a_law_that_jumps_in_time_is_met():
-    m = cart_pole("where(t < 0.0123, 100, 0)")
-    sim = m.stepper(0.01, outputs=NAMES)
-    for _ in range(5):
+@pytest.mark.parametrize("jump", ["0.0123", "0.02", "1.2/60"])  # within a step, and at the end of one
+@pytest.mark.parametrize("dt", [0.01, 1 / 300])
+def test_a_law_that_jumps_in_time_is_met(jump, dt):
+    m = cart_pole(f"where(t < {jump}, 100, 0)")
+    sim = m.stepper(dt, outputs=NAMES)
+    for _ in range(round(0.05 / dt)):
         y = sim.step()
     run = m.simulate(0.05, rtol=1e-11)
+    assert np.allclose(y, [run[name][-1] for name in NAMES], rtol=0, atol=1e-6)
+
+
+def test_breakpoints_follow_inputs():
+    """They are found for many steps at once, and again for a new value."""
+    m = cart_pole("where(t < until, 100, 0)", until=0.033)
+    sim = m.stepper(0.01, inputs=["until"], outputs=NAMES)
+    for until in (0.033, 0.033, 0.0312, 0.0312, 0.0312):
+        y = sim.step([until])
+    run = m.simulate(0.05, parameters={"until": 0.0312}, rtol=1e-11)
     assert np.allclose(y, [run[name][-1] for name in NAMES], rtol=0, atol=1e-6)
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.live import session
 from flyball.live.options import make_sliders
 from flyball.live.session import MAX_INVALID_MESSAGES, ClosedPage, exchange_messages, slow_remark
-from tests.live.pages import FOUR_BAR, Page, options
+from tests.live.pages import FOUR_BAR, Page, options, read
 from tests.mechanisms import example
 
 
@@ -317,3 +319,21 @@ def test_only_invalid_messages_in_succession_close_a_page():
 def test_a_chosen_range_is_finite():
     s = make_sliders(fb.Mechanism("m", parameters={"large": 1e308, "negative": -1.5e308}))
     assert all(np.isfinite([x.low, x.high]).all() and x.low <= x.value <= x.high for x in s.values())
+
+
+def test_a_long_run_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "PROGRESS_AFTER", 0.0)
+    monkeypatch.setattr(session, "PROGRESS_INTERVAL", 0.0)
+    page = Page(fb.load(FOUR_BAR), t_end=200.0)
+    said: list[dict[str, Any]] = []
+    page.session.receive(json.dumps({"do": "set", "name": "speed", "value": 61.0}))
+    list(page.session.work(tell=lambda message: said.append(read(message))))
+    assert said
+    assert {x["kind"] for x in said} == {"busy"}
+
+
+def test_progress_names_the_rest_of_the_time() -> None:
+    found = session.progress(0.02, 1.5, 60.0)
+    assert found["text"] == "computing: 2 % of 60 s, about 74 s more"
+    assert found["slow"] == "slow: 1.2 s of computing for 1 s of motion"
+    assert session.progress(0.95, 0.9, 60.0) == {"text": "computing", "slow": ""}

@@ -15,6 +15,7 @@ from flyball.view.animation import animation_html, record_motion, thinned_times
 from flyball.view.page import check_recording
 from flyball.view.recording import RecordedArrow, Recording, Shape
 from flyball.view.result_plots import plot_curves, write_standard_plots
+from flyball.view.still_picture import scene_strokes
 from tests.results.made_up import L, R, healthy, mechanism, slider_crank
 
 
@@ -369,3 +370,19 @@ def test_wrong_plots_are_refused(result: Result, tmp_path: Path) -> None:
         plot_curves(result, path=tmp_path / "a.gif")
     with pytest.raises(fb.ModelError, match=r"cannot write .*a\.png': there is no folder '.*no'; make it first"):
         plot_curves(result, path=tmp_path / "no" / "a.png")
+
+
+def test_shapes_of_ground_lie_behind_bodies_in_the_plane():
+    m = fb.Mechanism("m", planar=True)
+    m.add(fb.Body("cart", mass=1, inertia=1, shape=fb.Box(edges=(1, 1, 1)), color="#ff0000"))
+    m.add(fb.Ground("wall", shape=fb.Box(edges=(2, 2, 1)), color="#0000ff"))
+    recording = record_motion(still(m))
+    assert [(b.name, b.ground) for b in recording.bodies] == [("cart", False), ("wall", True)]
+    assert [s.fill for s in scene_strokes(recording)] == ["#0000ff", "#ff0000"]
+
+
+def test_a_body_without_a_shape_is_seen_on_its_way():
+    m = fb.Mechanism("kick", gravity=(0, 0, -9.81))
+    m.add(fb.Body("ball", mass=0.4, inertia=(0.004, 0.004, 0.004), velocity=(100, 0, 0)))
+    (shape,) = record_motion(m.simulate(1.0, outputs=3)).bodies[0].shapes
+    assert shape.size == pytest.approx((0.012 * 100.0,))

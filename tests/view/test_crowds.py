@@ -20,6 +20,7 @@ from flyball.view.page import (
 from flyball.view.recording import (
     RecordedBody,
     RecordedContacts,
+    RecordedJoint,
     RecordedPath,
     RecordedSet,
     Recording,
@@ -211,3 +212,22 @@ def test_incomplete_sets_and_contacts_are_refused():
         pack_recording(dataclasses.replace(pressed(), contacts=dataclasses.replace(c, begin=c.begin[1:])))
     with pytest.raises(ValueError, match="two bodies are named 'balls'"):
         pack_recording(dataclasses.replace(r, sets=(s, s)))
+
+
+def test_many_jointed_bodies_take_few_commands(opened: Open) -> None:
+    """Bodies with joints are no sets: their solids and symbols are drawn together all the same."""
+    t, n = np.linspace(0.0, 1.0, 3), 400
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+    places = [np.tile([k % 20, k // 20, 0.0], (3, 1)) + 0.1 * t[:, None] for k in range(n)]
+    shape = (Shape("box", (0.8, 0.3, 0.3)),)
+    bodies = tuple(RecordedBody(f"link {k}", shape, p, still) for k, p in enumerate(places))
+    joints = tuple(RecordedJoint(f"pin {k}", "spherical", f"link {k}", (0.4, 0, 0), (0, 0, 1)) for k in range(n))
+    tab = opened(animation_page(Recording("chain", False, t, bodies, joints=joints)), "t=0&view=top")
+    tab.settle()
+    assert tab.evaluate("flyball.drawn().calls") < 20
+    for time in (0.0, 1.0):
+        tab.evaluate(f"flyball.seek({time})")
+        tab.settle()
+        x, y = tab.evaluate("flyball.pixel('link 210')")
+        assert tab.evaluate("([x, y]) => flyball.pick(x, y)", [x, y]) == "link 210"
+    assert tab.errors == []

@@ -1,6 +1,7 @@
 """Videos without a browser: duration, speed in words, poses between output times, formats."""
 
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from PIL import Image
 
 import flyball as fb
 from flyball.view.animation import record_motion
-from flyball.view.video import playing_speed, resampled, speed_in_words
+from flyball.view.video import _ffmpeg, playing_speed, resampled, speed_in_words
 
 
 @pytest.mark.parametrize(
@@ -65,9 +66,13 @@ def test_sets_of_bodies_are_drawn(tmp_path):
 
 def test_other_formats_need_ffmpeg(tmp_path, monkeypatch):
     run = fb.load("examples/rope_pendulum.toml").simulate(0.5, outputs=11)
-    if shutil.which("ffmpeg"):
+    if _ffmpeg():
         run.to_video(tmp_path / "a.mp4", speed=1.0, frames_per_second=5, width=160)
         assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    with pytest.raises(fb.ModelError, match=r"needs the program ffmpeg, which is not installed; \.gif does not"):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(
+        fb.ModelError,
+        match=r"needs the program ffmpeg: install it, or run pip install 'flyball\[video\]'; \.gif needs neither",
+    ):
         run.save(tmp_path / "b.mp4")

@@ -120,25 +120,24 @@ def takes_arrays(code: np.ndarray, at: int) -> bool:
 
 
 def evaluate_over_time(
-    code: np.ndarray, const: np.ndarray, at: int, x: tuple[np.ndarray, ...], sensed: tuple[np.ndarray, np.ndarray]
+    steps: list[Step], const: np.ndarray, x: tuple[np.ndarray, ...], sensed: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """Values of a law at many times, (n,).
 
     Parameters
     ----------
-    code, const : ndarray
+    steps : list of Step
+    const : ndarray
         Of the tables; constants may be arrays over time, (n,).
-    at : int
-        Where it starts.
     x : tuple of ndarray (n,)
         Time and the other inputs of the law.
     sensed : pair of ndarray (slots, n)
         Values of sensors; and the sides of corners: where the law has corners, times on the same sides are
         evaluated together.
     """
-    steps, out = read_steps(code, at), np.empty(x[0].shape)
+    out = np.empty(x[0].shape)
     values, sides = sensed
-    corners = (_operations(code, at) == bytecode.BLEND).any()
+    corners = any(s.operation == bytecode.BLEND for s in steps)
     for some in _equal_branches(sides, len(out)) if corners else (slice(None),):
         row = [*values[:, some], *(sides[:, some][:, 0] if corners else sides)]
         with np.errstate(all="ignore"):

@@ -37,13 +37,14 @@ from ..model.model import Model
 from ..model.names import curve_parts
 from ..results.result import Result
 from ..view.animation import record_motion
+from ..view.further_states import record_further_states
 from ..view.page import pack_recording
 from ..view.recording import Recording
 from ..view.reference_picture import reference_svg
 from .dragging import AssemblyDrag, DragTarget
 from .messages import InvalidMessage, finite_number
 from .options import LiveOptions, Slider, make_sliders
-from .stepping import LiveStepping, slow_text
+from .stepping import PICTURE_INTERVAL, LiveStepping, slow_text
 
 MAX_MESSAGES_AT_ONCE = 1000
 """Messages taken before work goes on: a page that never pauses does not stop it."""
@@ -55,8 +56,8 @@ FILE_CHECK_INTERVAL = 0.3
 """Interval between two checks whether the model file has changed [s]."""
 MAX_SPEED = 1e9
 """Seconds of motion in a second that can be asked for."""
-PICTURE_INTERVAL = 1.0 / 30.0
-"""Interval between two pictures while stepping [s]."""
+PROGRESS_AFTER, PROGRESS_INTERVAL = 0.5, 0.25
+"""Duration of a run [s] after which the page says how far it is, and the interval between two messages."""
 KNOWN_ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 """Energies that positions and velocities determine."""
 
@@ -92,6 +93,8 @@ class LiveSession:
     ----------
     sliders : dict of str to Slider
         Parameters that can be moved, with their present values; empty until `work` has loaded the model.
+    playback_speed : float
+        Seconds of motion in a second of playing that suit the last run.
     """
 
     def __init__(
@@ -105,12 +108,15 @@ class LiveSession:
         self._changed, self._checked = _time_of_change(file), time.monotonic()
         self.sliders: dict[str, Slider] = {}
         self._result: Result | None = None
+        self._tell: Callable[[bytes], None]
+        self._known: Recording
+        self._moving: Recording
         self._stepping: LiveStepping | None = None
         self._drag: AssemblyDrag | None = None
         self._target: DragTarget | None = None
         self._pending_tasks: list[str] = ["model", "run"]  # in this order
         self._playing, self._speed, self._steps_requested = False, 1.0, 0
-        self._playback_speed = 1.0
+        self.playback_speed = 1.0
         self._model: Model | None = None
         self._drag_began, self._drawing, self._invalid_messages = 0.0, False, 0
         self._commands: dict[str, Callable[[Mapping[str, Any]], None]] = {
@@ -222,14 +228,19 @@ class LiveSession:
             return max(0.0, self._stepping.shown + PICTURE_INTERVAL - time.monotonic())
         return None if self._file is None else FILE_CHECK_INTERVAL
 
-    def work(self, poll: Callable[[], None] = lambda: None) -> Iterator[bytes]:
+    def work(
+        self, poll: Callable[[], None] = lambda: None, tell: Callable[[bytes], None] = lambda message: None
+    ) -> Iterator[bytes]:
         """Do the pending tasks, and yield messages to the page.
 
         Parameters
         ----------
         poll : callable
             Called during a run; it takes waiting messages by `receive`. A run is abandoned when a newer value arrives.
+        tell : callable
+            Sends a message during a run: how far it is.
         """
+        self._tell = tell
         self._check_file()
         while self._pending_tasks:
             task = {"model": self._describe, "run": self._run, "stepper": self._begin}[self._pending_tasks.pop(0)]
@@ -300,13 +311,20 @@ class LiveSession:
         model, o = self._known_model(), self._options
         values = {name: x.value for name, x in self.sliders.items()}
         self._stepping = self._drag = self._target = None
-        yield encode("busy", {"text": "computing"})
+        yield encode("busy", {"text": "computing", "slow": ""})
         began, error = time.perf_counter(), None
 
+        told = PROGRESS_AFTER
+
         def report(fraction: float) -> None:
+            nonlocal told
             poll()
             if "run" in self._pending_tasks:
                 raise SupersededRun
+            seconds = time.perf_counter() - began
+            if fraction > 0.0 and seconds > told:
+                told = seconds + PROGRESS_INTERVAL
+                self._tell(encode("busy", progress(fraction, seconds, o.t_end)))
 
         try:
             result = model.simulate(o.t_end, outputs=o.outputs, parameters=self._parameters(), progress=report)  # type: ignore[attr-defined]
@@ -317,7 +335,8 @@ class LiveSession:
         seconds = time.perf_counter() - began - result.health.compiling
         self._result = result
         recording = record_motion(result)
-        self._playback_speed = recording.speed
+        self._known = self._shown_parts(recording)
+        self.playback_speed = recording.speed
         span = float(result.t[-1] - result.t[0])
         content = {"values": values, "seconds": seconds, "slow": slow_remark(seconds, span)}
         yield encode("run", content, recording)
@@ -332,7 +351,7 @@ class LiveSession:
             model = self._known_model()
             if self._result is None:
                 raise ModelError(f"{model.name!r} has no motion yet: nothing can be stepped")
-            self._stepping = LiveStepping(model, self.sliders, self._playback_speed * PICTURE_INTERVAL / 2.0)
+            self._stepping = LiveStepping(model, self.sliders, self.playback_speed * PICTURE_INTERVAL / 2.0)
             self._target = None
             yield self._motion([self._stepping.sample()], True)
         self._stepping.begin_pace()
@@ -348,12 +367,14 @@ class LiveSession:
         finally:
             self._steps_requested = 0
         if samples:
-            self._drawing = True
-            yield self._motion(samples, False, x.slow_remark())
+            self._drawing, began = True, time.monotonic()
+            message = self._motion(samples, False, x.slow_remark())
+            x.recording = time.monotonic() - began
+            yield message
 
     def _motion(self, samples: list[Any], restart: bool, slow: str = "") -> bytes:
         assert self._stepping is not None
-        recording = self._trimmed(record_motion(self._stepping.motion(samples), with_notes=False))
+        recording = self._further(self._stepping.motion(samples), restart)
         return encode("motion", {"restart": restart, "slow": slow}, recording)
 
     def _assemble(self, poll: Callable[[], None]) -> Iterator[bytes]:
@@ -364,7 +385,7 @@ class LiveSession:
         if self._drag is None:
             self._drag = AssemblyDrag(self._known_model(), self._parameters(), *self._shown(target.t))
             self._stepping, self._drag_began = None, time.monotonic()
-        recording = self._trimmed(record_motion(self._drag.move(target), with_notes=False))
+        recording = self._further(self._drag.move(target), restart)
         self._target = None
         recording = dataclasses.replace(recording, t=np.array([time.monotonic() - self._drag_began]))
         yield encode("motion", {"restart": restart, "slow": "", "closure": self._drag.closure}, recording)
@@ -377,24 +398,21 @@ class LiveSession:
             raise ModelError("there is no position yet from which a body could be dragged")
         return self._result, int(np.argmin(np.abs(self._result.t - t)))
 
-    def _trimmed(self, recording: Recording) -> Recording:
-        """Return a recording with what the page does not have yet, and nothing that states do not determine."""
+    def _further(self, states: Result, restart: bool) -> Recording:
+        """Record further states; curves that have no value when stepping or dragging begins are left out from then."""
+        recording = record_further_states(states, self._known if restart else self._moving)
+        self._moving = recording if restart else self._moving
+        return recording
+
+    def _shown_parts(self, recording: Recording) -> Recording:
+        """Return the parts of the page whose states can be followed: accelerations and reactions are not known."""
         model = self._known_model()
 
         def known(name: str) -> bool:
             owner, what = curve_parts(name)
             return name in KNOWN_ENERGIES or (owner in model.by_name and not what.startswith("contact_"))
 
-        return dataclasses.replace(
-            recording,
-            bodies=tuple(dataclasses.replace(b, shapes=()) for b in recording.bodies),
-            lines=tuple(x for x in recording.lines if x.name in model.by_name),
-            channels=tuple(c for c in recording.channels if known(c.name)),
-            joints=(),
-            curves=(),
-            frames=(),
-            arrows=(),
-        )
+        return dataclasses.replace(recording, channels=tuple(c for c in recording.channels if known(c.name)))
 
 
 def exchange_messages(
@@ -430,8 +448,15 @@ def exchange_messages(
 
     while True:
         receive_waiting(session.wait())
-        for message in session.work(lambda: receive_waiting(0.0)):
+        for message in session.work(lambda: receive_waiting(0.0), send):
             send(message)
+
+
+def progress(fraction: float, seconds: float, span: float) -> dict[str, str]:
+    """Say how far a run over a time span [s] is, how long the rest will need, and how slow it is."""
+    left = seconds * (1.0 - fraction) / fraction
+    text = f"computing: {100.0 * fraction:.0f} % of {span:g} s, about {left:.0f} s more" if left >= 1.0 else "computing"
+    return {"text": text, "slow": slow_remark(seconds / fraction, span)}
 
 
 def slow_remark(seconds: float, span: float) -> str:

@@ -26,8 +26,11 @@ MAX_PULLED_BODIES = 40
 """Bodies that can be pulled: each adds a force and a torque to every step."""
 MAX_SAMPLES = 12
 """States of one picture that are kept for the curves, besides the last."""
-COMPUTING_TIME_PER_PICTURE = 0.04
-"""Time for the steps of one picture [s]; steps that are due but not taken by then are omitted, and the page says so."""
+PICTURE_INTERVAL = 1.0 / 30.0
+"""Interval between two pictures while stepping [s]; steps that are due but not taken by then are omitted, and the page
+says so."""
+MIN_COMPUTING_TIME = 0.25 * PICTURE_INTERVAL
+"""Least time for the steps of one picture [s], if recording the last one has left less."""
 MAX_PICTURE_INTERVAL = 1.0
 """Time between two pictures [s] for which steps are made up: a page that was hidden for longer goes on from there."""
 SPRING_FREQUENCY = 0.25
@@ -44,6 +47,11 @@ class LiveStepping:
     sliders : mapping of str to Slider
     dt : float [s]
         Duration of a step.
+
+    Attributes
+    ----------
+    recording : float [s]
+        Time for recording the last picture, which is not left for steps.
 
     Raises
     ------
@@ -65,6 +73,7 @@ class LiveStepping:
         self.method = self._stepper.method
         self._gripped: tuple[str, tuple[float, ...]] | None = None
         self._slow, self._seconds_per_step = "", math.inf
+        self.recording = 0.0
         self.begin_pace()
 
     def accepts(self, name: str) -> bool:
@@ -104,7 +113,7 @@ class LiveStepping:
             self.shown = began
             return []
         values = np.array([to_si(str(sliders[k].quantity), None) for k in self._inputs])
-        end = math.inf if count is not None else began + COMPUTING_TIME_PER_PICTURE
+        end = math.inf if count is not None else began + max(MIN_COMPUTING_TIME, PICTURE_INTERVAL - self.recording)
         samples, done = self._take_steps(due, values, target, end)
         self._slow = ""
         if done < due:

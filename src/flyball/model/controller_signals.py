@@ -166,7 +166,10 @@ def substitute_signals(model: Model, law: Expression, of: LawOf) -> Expression:
 
 def signal_law(model: Model, e: Controller, name: str) -> Expression:
     """Return a signal or state of a controller as a law."""
-    return Expression(f"{e.name}.{name}", _signal_graph(model).signal(e, name), None, f"{name} of {e.title}")
+    graph, key = _signal_graph(model), (e.name, name)
+    if key not in graph.laws:
+        graph.laws[key] = Expression(f"{e.name}.{name}", graph.signal(e, name), None, f"{name} of {e.title}")
+    return graph.laws[key]
 
 
 def input_law(model: Model, e: Controller, name: str) -> Expression:
@@ -260,6 +263,7 @@ class _SignalGraph:
     def __init__(self, model: Model) -> None:
         self.model, self.all = model, controllers_by_name(model)
         self.known: dict[tuple[str, str], SyntaxNode] = {}
+        self.laws: dict[tuple[str, str], Expression] = {}
         self.way: list[str] = []
         self.rings: dict[str, str] = {}
         self.states = {name: e.states(resolve(e, model.environment())) for name, e in self.all.items()}

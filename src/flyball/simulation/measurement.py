@@ -48,20 +48,25 @@ def model_with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[s
     if repeated:
         raise ModelError(f"the input {repeated[0]!r} is named twice; leave one of them out")
     out, inputs = with_inputs(model, names)
+    out = out.snapshot()
+    read = [(e, law.names) for e, law, _ in element_laws(out)]
+    named = {name for _, names in read for name in names}
+    named.update(*(law.names for law in out.gravity_laws() if law is not None))
     for x in inputs:
-        laws = ((e, law) for e, law, _ in element_laws(out) if isinstance(e, (Driver, Coupling)))
-        driven = [e.title for e, law in laws if x.parameter in law.names]
+        driven = [e.title for e, found in read if isinstance(e, (Driver, Coupling)) and x.parameter in found]
         if driven:
             raise ModelError(
                 f"{x.name!r} cannot be an input of a stepper: it sets the position of {driven[0]}, which would jump "
                 "from one step to the next. Use a motor whose torque is the input, or whose law is that of a servo"
             )
         _refuse_numbers(out, x.name, x.parameter)
-    return out.snapshot(), [x.parameter for x in inputs]
+        if x.parameter not in named:
+            raise ModelError(f"{x.name!r} cannot be an input of a stepper: no law reads it")
+    return out, [x.parameter for x in inputs]
 
 
 def _refuse_numbers(model: Model, name: str, parameter: str) -> None:
-    """Refuse a parameter that no law reads, or that anything but a law depends on."""
+    """Refuse a parameter that anything but a law depends on."""
     value = float(model.environment({})[parameter])
     other = {parameter: CHANGED_INPUT * value if value else 1.0}
     refusal = f"{name!r} cannot be an input of a stepper: "
@@ -77,9 +82,6 @@ def _refuse_numbers(model: Model, name: str, parameter: str) -> None:
             f"{refusal}{what} depends on it by a number (a mass, a length, a stiffness), and inputs are read by laws "
             "only. Give a force or motor as input, or write the law with a parameter of its own"
         )
-    named = [law for _, law, _ in element_laws(model)] + [law for law in model.gravity_laws() if law is not None]
-    if not any(parameter in law.names for law in named):
-        raise ModelError(f"{refusal}no law reads it")
 
 
 def _dependent_number(model: Model, other: Mapping[str, float]) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..engine.entry_point import INTEGRATE
 from ..errors import ModelError, SimulationError
-from ..laws.breakpoints import NO_BREAKPOINTS
+from ..laws.breakpoints import NO_BREAKPOINTS, Breakpoints, rounding_margin
+from ..laws.bytecode import CONSTANT
 from ..laws.python_functions import clear_faults, deferred_interrupts
 from ..model.model import Model
 from ..numerics.integrators import time_loop as ex
@@ -27,7 +28,8 @@ from .integration_options import Integration, Stepping
 from .measurement import Measurement
 from .simulate import clock_for, row_width
 
-HORIZON = 1000  # steps whose duration scales the tolerances of an integration, as the time span of a simulation does
+HORIZON = 1000  # steps whose duration scales the tolerances of an integration, as the time span of a simulation does;
+# breakpoints of laws are found for as many at once
 
 
 POSE_WIDTH = 12  # of a row of `Movers.pose`
@@ -68,6 +70,15 @@ class IntegratedState(NamedTuple):
     work: Any
 
 
+class KnownBreaks(NamedTuple):
+    """Breakpoints of laws between two times [s], with these values of the inputs."""
+
+    begin: float
+    end: float
+    inputs: bytes
+    found: Breakpoints
+
+
 class IntegratedMotion:
     """A smooth motion, integrated by an explicit method from step to step.
 
@@ -96,6 +107,9 @@ class IntegratedMotion:
         clock.real.h_max = np.inf if o.step is None else o.step
         clock.count.quota = clock.count.limit
         self._timed = bool(laws_of_time(c))
+        read = [x.operand for _, steps in laws_of_time(c) for x in steps if x.operation == CONSTANT]
+        self._law_inputs = np.intersect1d(self._inputs, np.array(read, np.int64))
+        self._ahead, self._known = HORIZON * dt, KnownBreaks(np.inf, -np.inf, b"", NO_BREAKPOINTS)
         self._call = c.bound(tableau(self.method), clock, np.zeros((2, row_width(start.assembly))))
 
     def set_inputs(self, values: np.ndarray) -> None:
@@ -117,10 +131,12 @@ class IntegratedMotion:
         clear_faults(self.c.array("stack"))
         intervals = None
         if self._timed:
-            intervals = SmoothIntervals(clock, known_breaks(self.c, float(clock.real.t), t))
+            intervals = SmoothIntervals(clock, self._breaks_until(t))
         with deferred_interrupts(self.structure.functions):
             while True:
                 clock.count.accepted = clock.count.rejected = 0
+                if intervals is not None:
+                    intervals.passed()
                 self._call(INTEGRATE)
                 if clock.count.status != ex.DONE or intervals is None or not intervals.next():
                     break
@@ -129,6 +145,21 @@ class IntegratedMotion:
                 self.start.assembly, self.start.base, clock, with_result=False, method=self.method
             )
             raise SimulationError(message, None, float(clock.real.t)) from cause
+
+    def _breaks_until(self, t: float) -> Breakpoints:
+        """Return the breakpoints of laws from the present time to time t, found for many steps at once."""
+        now, inputs = float(self.clock.real.t), self.c.system.const[self._law_inputs].tobytes()
+        known = self._known
+        if inputs != known.inputs or not known.begin <= now <= t <= known.end:
+            end = max(t, now + self._ahead) if inputs == known.inputs or not known.inputs else t
+            found = known_breaks(self.c, now, end)
+            if found.given_up and end > t:  # they are too many for so long a time
+                self._ahead, end = 0.0, t
+                found = known_breaks(self.c, now, end)
+            known = self._known = KnownBreaks(now, end, inputs, found)
+        times = known.found.times
+        due = (times >= now) & (times <= t + rounding_margin(t))
+        return Breakpoints(times[due], known.found.sharp[due], known.found.given_up)
 
     def measure_by(self, x: Measurement) -> None:
         """Prepare for `write_state`."""

@@ -328,12 +328,12 @@ def _symbols_and_lines(
                 replace(d, scale=1.0) for d in element_symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
             )
         elif (
-            found := _force_line(e, places, every) or coordinate_spring_line(e, places, every, looks.size)
+            found := force_line(e, places, every) or coordinate_spring_line(e, places, every, looks.size)
         ) is not None:
             yield found
 
 
-def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLine | None:
+def force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLine | None:
     """Return the line of a force element: a rope with its free length, a spring, or a damper without stiffness."""
     ends = rope_ends(places, e.name)
     numbers = places.result.values.numbers[e.name]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, quaternion_to_matrix, triad
 from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
-from .recording import RecordedJoint, Shape, shape_box
+from .recording import RecordedJoint, Shape, half_extent, shape_box
 from .symbols import BODY_SYMBOLS, AttachedFrame, AttachedFrames, cam_outline, float_triple
 
 if TYPE_CHECKING:
@@ -113,6 +114,7 @@ MIN_GAP = 0.09  # distance of a joint from a shape that a link spans, relative t
 LINK_RADIUS = 0.045  # radius of a link, relative to the mechanism's typical length
 MAX_TRIANGLES = 24_000  # number of triangles of all meshes of a recording
 MIN_MESH_TRIANGLES = 300  # number of triangles that a mesh keeps in any case
+MIN_VISIBLE = 0.012  # half the size of a body without a shape of its own, relative to the extent of the motion
 MIN_SYMBOL_SCALE = 0.5  # size of a symbol on slender parts, relative to its usual size
 
 
@@ -252,7 +254,7 @@ class BodyShapes:
         elif points and bare:
             out += self._hung(points[0], name)
         elif bare:
-            out += [self._solid(name)]
+            out += [self._visible(self._solid(name))]
         return tuple(out)
 
     def _joining(self, shapes: list[Shape], points: list[np.ndarray]) -> Iterator[Shape]:
@@ -351,6 +353,18 @@ class BodyShapes:
         if along < 0.1 * across and half > 0.6 * d:
             return [self._capsule(p, com + half * e)]
         return [self._capsule(p, com, 0.4 if self.planar else 1.0), self._solid(name)]
+
+    def _visible(self, shape: Shape) -> Shape:
+        """Return the shape, enlarged if it would not be seen on its way."""
+        factor = MIN_VISIBLE * self._extent / half_extent(shape)
+        return replace(shape, size=tuple(factor * x for x in shape.size)) if factor > 1.0 else shape
+
+    @cached_property
+    def _extent(self) -> float:
+        """Return the extent of the motion [m]."""
+        parts = [piece.motions.W.bodies.position.real for piece in self.result.pieces or (self.result,)]
+        p = np.concatenate(parts, axis=2)
+        return float(np.nanmax(np.nanmax(p, axis=(0, 2)) - np.nanmin(p, axis=(0, 2))))
 
     def _solid(self, name: str) -> Shape:
         """Return the homogeneous solid with the body's inertia: ball, cylinder or box; a disc in the plane."""

@@ -152,6 +152,7 @@ def _header(recording: Recording, block: _NumberBlock) -> dict[str, Any]:
                 "name": b.name,
                 "color": b.color,
                 "opacity": float(b.opacity),
+                "ground": bool(b.ground),
                 "shapes": [_shape_data(s, block) for s in b.shapes],
             }
             | {"p": block.add(b.p), "q": block.add(sign_continuous(b.q))}
@@ -303,6 +304,7 @@ PLAYER_MODULES = (
     "trails",
     "crowdshapes",
     "crowd",
+    "batches",
     "mechanism",
     "stage",
     "marks",
@@ -321,6 +323,8 @@ PLAYER_MODULES = (
     "overlay",
     "variants",
     "compared",
+    "vector",
+    "film",
     "save",
     "main",
 )
@@ -423,6 +427,7 @@ def _module_as_function(name: str, module: str) -> str:
     """Return a module as a function that returns its exports; only its named imports are supported."""
     exported = ", ".join(re.findall(r"^export (?:class|const|function) (\w+)", module, flags=re.M))
     body = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";', r"const \1 = $\2;", module, flags=re.M)
+    body = re.sub(r'^import (\{[^}]*\}) from "\w+";', r"const \1 = LIB;", body, flags=re.M)
     body = re.sub(r"^import .*;\n", "", body, flags=re.M)
     body = re.sub(r"^export ", "", body, flags=re.M)
     return f"const ${name} = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();"

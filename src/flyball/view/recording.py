@@ -80,7 +80,10 @@ def half_extent(shape: Shape) -> float:
 
 @dataclass(frozen=True)
 class RecordedBody:
-    """A body: its shapes and its pose over time, ``p`` (n, 3) [m] and ``q`` (n, 4) scalar first, world from body."""
+    """A body: its shapes and its pose over time, ``p`` (n, 3) [m] and ``q`` (n, 4) scalar first, world from body.
+
+    Shapes of ``ground`` are drawn behind all others in the plane.
+    """
 
     name: str
     shapes: tuple[Shape, ...]
@@ -88,6 +91,7 @@ class RecordedBody:
     q: np.ndarray
     color: str | None = None
     opacity: float = 1.0
+    ground: bool = False
 
 
 @dataclass(frozen=True)

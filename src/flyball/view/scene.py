@@ -100,7 +100,7 @@ def ground_bodies(
         for name, shapes, opacity in ((e.name, solid, 1.0), (walls, glass, WALL_OPACITY)):
             if shapes:
                 pose = np.tile(p, (len(every), 1)), np.tile(turn, (len(every), 1))
-                out.append(RecordedBody(name, tuple(shapes), *pose, e.color or "#9aa6b3", opacity))
+                out.append(RecordedBody(name, tuple(shapes), *pose, e.color or "#9aa6b3", opacity, ground=True))
     return out
 
 

@@ -217,7 +217,8 @@ def _all_strokes(recording: Recording, eye: np.ndarray, at: int) -> Iterator[Str
     poses = {GROUND: (np.zeros(3), np.eye(3))}
     for k, body in enumerate(recording.bodies):
         poses[body.name] = body.p[at], quaternion_to_matrix(body.q[at])
-        layer = 1e-6 * k * recording.size if recording.planar else 0.0
+        order = k - len(recording.bodies) if body.ground else k
+        layer = 1e-6 * order * recording.size if recording.planar else 0.0
         for stroke in _body_strokes(body, eye, BODY_COLORS[k % len(BODY_COLORS)], *poses[body.name]):
             yield stroke._replace(depth=stroke.depth + layer)
     for curve in recording.curves:

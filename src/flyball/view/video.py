@@ -1,4 +1,4 @@
-"""Videos of a motion, drawn without a browser: GIF, and MP4 or WebM where the program ffmpeg is installed.
+"""Videos of a motion, drawn without a browser: GIF, and MP4 or WebM where ffmpeg is installed.
 
 The scene is drawn as in `still_picture`, from a fixed direction, at evenly spaced times; between the times of the
 recording poses are interpolated.
@@ -102,7 +102,7 @@ def save_video(
     ----------
     result : Result
     path : str or path
-        Its ending selects the format: .gif, or .mp4 and .webm, which need the program ffmpeg.
+        Its ending selects the format: .gif, or .mp4 and .webm, which need ffmpeg (extra ``video``).
     speed : float, optional
         Seconds of motion in a second of video; by default 1, or a round factor for short and long motions.
     frames_per_second : int
@@ -161,10 +161,25 @@ def _write_gif(path: Any, frames: Iterator[Image.Image], interval: float) -> Non
         first.save(file, "GIF", save_all=True, append_images=rest, duration=round(1000 * interval), loop=0)
 
 
+def _ffmpeg() -> str | None:
+    """Return the program ffmpeg: the installed one, else that of the package imageio-ffmpeg, else None."""
+    if program := shutil.which("ffmpeg"):
+        return program
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ImportError, RuntimeError):  # it has none for this system
+        return None
+
+
 def _write_by_ffmpeg(path: Any, ending: str, frames: Iterator[Image.Image], rate: int) -> None:
-    program = shutil.which("ffmpeg")
+    program = _ffmpeg()
     if program is None:
-        raise ModelError(f"a video {ending} needs the program ffmpeg, which is not installed; .gif does not")
+        raise ModelError(
+            f"a video {ending} needs the program ffmpeg: install it, or run pip install 'flyball[video]'; .gif needs "
+            "neither, and a page saves its animation as MP4 or WebM"
+        )
     codec = ["-c:v", "libx264", "-crf", "20"] if ending == ".mp4" else ["-c:v", "libvpx-vp9", "-crf", "32", "-b:v", "0"]
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / f"video{ending}"

@@ -12,7 +12,7 @@ from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
 from ...errors import AnalysisError
 from ...laws.bytecode import STACK_RESERVE, evaluate
-from ...laws.interval_evaluation import evaluate_over_time, takes_arrays
+from ...laws.interval_evaluation import evaluate_over_time, read_steps, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
@@ -91,6 +91,7 @@ class ForceView(PartView):
         """Return the indices of its switches."""
         return [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element and x.row >= 0]
 
+    @cached_property
     def _whole_along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return (value, rate, effort, closed side), including the forces of active rows.
 
@@ -126,7 +127,8 @@ class ForceView(PartView):
         if self._result.motions.dtype == float and takes_arrays(S.code, at):
             slots = self._result.measured.slots[0]
             behind = len(slots) - len(s.switches)
-            return evaluate_over_time(S.code, S.const, at, (t, a, b), (slots[:behind], slots[behind:]))
+            steps = s.cache.get("steps of laws", at, len(S.code), lambda: read_steps(S.code, at))
+            return evaluate_over_time(steps, S.const, (t, a, b), (slots[:behind], slots[behind:]))
         stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.motions.dtype)
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)
@@ -154,7 +156,7 @@ class ForceView(PartView):
         if isinstance(self.element, JointForce):
             joint = self._x.structure.model[self.element.joint]
             axis = coordinate_records(self._result.motions, joint, "angle")[0][1]
-            effort = self._whole_along()[2]
+            effort = self._whole_along[2]
             return np.zeros((n, 3)), np.stack([a * effort for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
             raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self.names)}")
@@ -166,7 +168,7 @@ class ForceView(PartView):
         """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
         r, s = self._result.records, self._x.structure
         points = [np.stack(r.frame(s.frame_at[self.element.name, role, ""])[0], axis=1) for role in self.element.ends()]
-        tension = -self._whole_along()[2]
+        tension = -self._whole_along[2]
         forces = [np.zeros_like(p) for p in points]
         for k in range(len(points) - 1):
             d = points[k + 1] - points[k]
@@ -200,7 +202,7 @@ class ForceView(PartView):
     def power(self) -> np.ndarray:
         """Power supplied to the bodies [W]."""
         if isinstance(self.element, CoordinateForce):
-            _, rate, effort, _ = self._whole_along()
+            _, rate, effort, _ = self._whole_along
             return rate * effort
         _, force, torque = self._between()
         F, M, _ = self._frames
@@ -236,7 +238,7 @@ class ForceView(PartView):
             return self._whole[name == "torque"]
         k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
-            value = self._whole_along()[k]
+            value = self._whole_along[k]
             if k > 2:
                 return np.abs(value) if name == "taut" else value
             seen = self.element.outward(self._x.numbers[self.element.name])

@@ -4,7 +4,7 @@ import { outlineColour } from "./theme.js";
 import { meshGeometry, placed } from "./solids.js";
 
 // The painter's order: what comes later lies on top. A body takes two numbers, outline and fill.
-export const ORDER = { shadow: 10, ground: 20, trail: 30, guide: 40, body: 100, line: 1e5, pin: 2e5, arrow: 4e5 };
+export const ORDER = { floor: 5, shadow: 10, ground: 20, trail: 30, guide: 40, body: 100, line: 1e5, pin: 2e5, arrow: 4e5 };
 const MANY = 60; // corners of an outline from which it is taken as a curve and not rounded
 const CIRCLE = Array.from({ length: 64 }, (_, k) => (k * Math.PI) / 32);
 
@@ -149,7 +149,7 @@ function fill(outline, material, order) {
 export function flatBody(body, colour, index) {
   const group = new THREE.Group();
   const shade = new THREE.Group();
-  const order = ORDER.body + 3 * index;
+  const order = body.ground ? ORDER.floor : ORDER.body + 3 * index;
   const paint = flatMaterial({ color: colour });
   const dusk = flatMaterial({ color: "#0a1420", opacity: 0.12 });
   const edges = [];

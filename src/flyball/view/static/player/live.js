@@ -65,7 +65,7 @@ class Live {
     const recording = message.recording && readRecording(message.recording);
     const handlers = {
       model: () => this.#describe(message),
-      busy: () => this.#say(message.text),
+      busy: () => this.#busy(message),
       run: () => this.#run(message, recording),
       motion: () => this.#motion(message, recording),
       stepping: () => this.#say(this.stepping ? "stepping" : "stepped"),
@@ -102,6 +102,12 @@ class Live {
     this.#say(`${shortNumber(span)} s computed in ${Number(seconds.toPrecision(2))} s`);
     if (this.player) this.player.replace(recording);
     else this.#begin(recording);
+  }
+
+  /** Say how far a run is; of what is slow, the remark stays until another one is known. */
+  #busy({ text, slow }) {
+    this.#say(text);
+    if (slow) this.#slow(slow);
   }
 
   #begin(recording) {

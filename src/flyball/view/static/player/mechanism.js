@@ -1,13 +1,14 @@
 // The drawn mechanism: every body, line and joint of a recording as three.js objects, set to any time.
 import * as THREE from "three";
 import { Arrows } from "./arrows.js";
+import { Batches } from "./batches.js";
 import { Crowd } from "./crowd.js";
 import { frameAt, pointAt, poseAt } from "./data.js";
 import { ORDER, flatBody, stroke } from "./flats.js";
 import { flatJoint } from "./joints2d.js";
 import { solidJoint } from "./joints3d.js";
 import { buildLine } from "./lines.js";
-import { refine, solidBody } from "./solids.js";
+import { FINENESS, refine, solidBody } from "./solids.js";
 import { bodyColours, GROUND } from "./theme.js";
 import { Trail } from "./trails.js";
 import { Triads } from "./triads.js";
@@ -33,7 +34,13 @@ export class Mechanism {
     this.arrows = new Arrows(recording, unit, extent, (rider, out) => this.place(rider, out));
     this.triads = new Triads(recording, unit, this.bodies);
     this.overlay.add(this.arrows.root, this.triads.root);
+    this.batches = recording.planar || FINENESS.fine ? null : new Batches(this.root);
     this.seek(recording.t[0]);
+  }
+
+  /** To be called before a picture is drawn. */
+  prepare() {
+    this.batches?.update();
   }
 
   #body(body, colour, index) {
@@ -213,7 +220,7 @@ export class Mechanism {
     const meshes = [];
     const visit = (object) => {
       if (!object.visible) return;
-      if (object.isMesh && !object.isLineSegments2 && (object.userData.part || object.userData.crowd))
+      if (object.isMesh && !object.isLineSegments2 && (object.userData.part || object.userData.crowd || object.userData.meshes))
         meshes.push(object);
       object.children.forEach(visit);
     };
@@ -222,6 +229,7 @@ export class Mechanism {
     if (this.recording.planar) hits.sort((a, b) => b.object.renderOrder - a.object.renderOrder);
     if (!hits.length) return null;
     const [{ object, instanceId }] = hits;
-    return object.userData.crowd?.member(instanceId) ?? object.userData.part;
+    const { crowd, meshes: alike } = object.userData;
+    return crowd?.member(instanceId) ?? alike?.[instanceId].userData.part ?? object.userData.part;
   }
 }

@@ -1,10 +1,10 @@
-// Taking away what the page shows: the picture (PNG), the plots (SVG), the animation (WebM).
+// Taking away what the page shows: the picture (PNG, SVG), the plots (SVG), the animation (GIF, MP4 or WebM).
+import { Copy, drawGif, recordVideo, videoFormat } from "./film.js";
 import { CURVES } from "./theme.js";
+import { vectorPicture } from "./vector.js";
 
 const NS = "http://www.w3.org/2000/svg";
-const FRAMES = 30; // a second of video
 const HEAD = 22; // px above a plot, for its names
-const TYPES = ["video/webm;codecs=vp9", "video/webm"];
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -16,29 +16,22 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-/** A canvas on which the picture of a stage is copied, with its ground. */
-class Copy {
-  constructor(stage) {
-    this.from = stage.element.querySelector("canvas");
-    this.canvas = document.createElement("canvas");
-    Object.assign(this.canvas, { width: 2 * Math.floor(this.from.width / 2), height: 2 * Math.floor(this.from.height / 2) });
-    this.pen = this.canvas.getContext("2d");
-  }
-
-  /** Copy the picture; to be called in the frame in which it was drawn. */
-  take() {
-    this.pen.fillStyle = css("--stage-b");
-    this.pen.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.pen.drawImage(this.from, 0, 0);
-  }
+/** Draw the picture as it is now. */
+function drawNow(stage) {
+  stage.dirty = true;
+  stage.draw(performance.now());
 }
 
 function savePicture({ stage }, name) {
-  const copy = new Copy(stage);
-  stage.dirty = true;
-  stage.draw(performance.now());
+  const copy = new Copy(stage, css("--stage-b"));
+  drawNow(stage);
   copy.take();
   copy.canvas.toBlob((blob) => download(blob, `${name}.png`), "image/png");
+}
+
+function saveScene({ stage }, name) {
+  drawNow(stage);
+  download(new Blob([vectorPicture(stage, css("--stage-b"))], { type: "image/svg+xml" }), `${name}.svg`);
 }
 
 function svg(parent, tag, attributes, text = "") {
@@ -99,52 +92,41 @@ function savePlots({ plots }, name) {
   const look = { "font-family": "sans-serif", "font-size": 12, fill: css("--ink") };
   for (const [key, value] of Object.entries({ width, height, viewBox: `0 0 ${width} ${height}`, ...look })) root.setAttribute(key, value);
   root.prepend(ground);
-  download(new Blob([new XMLSerializer().serializeToString(root)], { type: "image/svg+xml" }), `${name}.svg`);
+  download(new Blob([new XMLSerializer().serializeToString(root)], { type: "image/svg+xml" }), `${name}-plots.svg`);
 }
 
-/** Record the animation once from its begin to its end, at its speed; returns what ends it early. */
-function record({ picture, clock }, name, onEnd) {
-  const copy = new Copy(picture.stage);
-  const type = TYPES.find((one) => MediaRecorder.isTypeSupported(one));
-  const recorder = new MediaRecorder(copy.canvas.captureStream(FRAMES), { mimeType: type, videoBitsPerSecond: 8e6 });
-  const parts = [];
-  const { looping } = clock;
-  recorder.ondataavailable = ({ data }) => parts.push(data);
-  recorder.onstop = () => {
-    Object.assign(clock, { looping });
-    picture.onFrame = null;
-    download(new Blob(parts, { type: "video/webm" }), `${name}.webm`);
-    onEnd();
-  };
-  const stop = () => recorder.state !== "inactive" && recorder.stop();
-  clock.looping = false;
-  clock.seek(clock.begin);
-  picture.onFrame = (drawn) => {
-    if (drawn) copy.take();
-    if (!clock.playing) setTimeout(stop, 1000 / FRAMES); // the last frame is part of it
-  };
-  recorder.start();
-  clock.play();
-  return stop;
+/** A button that makes a file of the animation: pressed again it ends it early. */
+function filmButton(button, make) {
+  const said = button.textContent;
+  let stop = null;
+  button.addEventListener("click", () => {
+    if (stop) return stop();
+    button.textContent = "Recording: end";
+    stop = make(() => {
+      button.textContent = said;
+      stop = null;
+    });
+  });
 }
 
 /** The buttons that save something; `player` is the page's. */
 export function saveButtons(box, player) {
   const name = () => player.recording.name.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "motion";
   const button = (what) => box.querySelector(`[name=save-${what}]`);
-  const film = button("webm");
+  const [video, gif, format] = [button("video"), button("gif"), videoFormat()];
   button("png").addEventListener("click", () => savePicture(player.picture, name()));
+  button("scene").addEventListener("click", () => saveScene(player.picture, name()));
   button("svg").addEventListener("click", () => player.plots.plots.length && savePlots(player.plots, name()));
-  button("png").disabled = film.disabled = !player.picture.stage.renderer;
-  film.disabled ||= typeof MediaRecorder === "undefined" || player.clock.still;
-  const said = film.textContent;
-  let stop = null;
-  film.addEventListener("click", () => {
-    if (stop) return stop();
-    film.textContent = "Recording: end";
-    stop = record(player, name(), () => {
-      film.textContent = said;
-      stop = null;
-    });
-  });
+  const drawn = Boolean(player.picture.stage.renderer);
+  button("png").disabled = !drawn;
+  for (const one of [video, gif]) one.disabled = !drawn || player.clock.still;
+  video.disabled ||= !format;
+  const ending = format?.ending ?? "webm";
+  video.textContent = `Animation (${{ mp4: "MP4", webm: "WebM" }[ending]})`;
+  const done = (kind, onEnd) => (blob) => {
+    download(blob, `${name()}.${kind}`);
+    onEnd();
+  };
+  filmButton(video, (onEnd) => recordVideo(player, css("--stage-b"), format, done(ending, onEnd)));
+  filmButton(gif, (onEnd) => drawGif(player, css("--stage-b"), done("gif", onEnd)));
 }

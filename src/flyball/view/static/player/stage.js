@@ -244,6 +244,7 @@ export class Stage {
     if (!this.dirty) return false;
     this.dirty = false;
     this.#prepareDraw();
+    this.mechanism.prepare();
     if (!this.renderer) return true;
     this.renderer.autoClear = true;
     this.renderer.render(this.scene, this.camera);
