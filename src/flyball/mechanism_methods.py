@@ -899,6 +899,9 @@ class StaticsMethods(Model):
         is bracketed and found to rounding; values are added where branches meet. An eigenvalue that leaves a half plane
         and returns between two values can be missed, unless its branch heads for the axis: give more values.
 
+        With sampled controllers they are the multipliers of a deviation in one cycle, which are stable within the unit
+        circle.
+
         Parameters
         ----------
         parameter : str

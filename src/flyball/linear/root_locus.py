@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import groupby, pairwise
 
@@ -29,13 +29,14 @@ from ..derivatives.eigenvalues import spectrum
 from ..derivatives.linearized_equations import FreeCoordinates, ReducedEquations, TurningFrame
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
-from ..model.unsupported_elements import refuse_sampled_controllers, refuse_unsupported
+from ..model.unsupported_elements import refuse_unsupported
 from ..progress import ReportProgress, progress_bar
 from ..results.equilibrium import Equilibrium
 from ..results.modes import Crossing, RootLocus, half_plane
 from ..statics.equilibrium import equilibrium, rest_options
 from ..statics.equilibrium_series import EquilibriaOptions, checked_values, equilibria, series_error
-from .linearize import OperatingPointOptions, equations_without_inputs
+from .linearize import LinearizeOptions, OperatingPointOptions, controlled_linear_model, equations_without_inputs
+from .sampled_root_locus import sampled_root_locus
 
 
 @dataclass
@@ -465,9 +466,11 @@ class RootLocusOptions(OperatingPointOptions):
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     """Compute eigenvalues over a parameter as branches, and the stability changes: see `Mechanism.root_locus`."""
     refuse_unsupported(model, "root_locus", controlled=True)
-    refuse_sampled_controllers(model, "root_locus")
     points = checked_values(model, o.parameter, o.values, o.t, o.parameters)
     rest = (_ControlledEquilibria if model.controllers else _EquilibriumBranch)(model, o, points)
+
+    if any(e.sampled for e in model.controllers):
+        return _sampled_locus(model, o, points, rest)
 
     def at(place: float) -> EigenvalueSample:
         value = float(np.interp(place, np.arange(len(points)), points))
@@ -478,6 +481,26 @@ def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
     with progress_bar(o.progress, f"eigenvalues over {o.parameter}") as tell:
         return _trace_locus(done, points, at, tell)
+
+
+def _sampled_locus(
+    model: Model, o: RootLocusOptions, points: np.ndarray, rest: _EquilibriumBranch | _ControlledEquilibria
+) -> RootLocus:
+    """Root locus with sampled controllers."""
+    done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex), period=0.0)
+    places = np.arange(len(points))
+
+    def matrix(value: float) -> np.ndarray:
+        step = 1 if points[0] < points[-1] else -1
+        place = float(np.interp(value, points[::step], places[::step]))
+        here = o.here(value, rest.at(place, value) if o.equilibrium else None)
+        given = {f.name: getattr(here, f.name) for f in fields(OperatingPointOptions)}
+        found, _ = controlled_linear_model(model, LinearizeOptions(**given, inputs=(), outputs=(), independent=()))
+        done.period = found.period
+        return found.A
+
+    with progress_bar(o.progress, f"multipliers over {o.parameter}") as tell:
+        return sampled_root_locus(done, points, matrix, tell)
 
 
 class _EquilibriumBranch:

@@ -235,24 +235,33 @@ def mode_motion(m: Modes, k: int, amplitude: float, outputs: int) -> Result:
 
 
 class Crossing(NamedTuple):
-    """A change of stability: eigenvalues cross the imaginary axis.
+    """A change of stability: eigenvalues cross the imaginary axis, or multipliers the unit circle.
 
     Attributes
     ----------
     value : float
         Value of the parameter.
     eigenvalue : complex [1/s]
-        Eigenvalue on the imaginary axis; of a pair the upper one.
+        Eigenvalue on the imaginary axis; of a pair the upper one. Of sampled loops the multiplier on the circle [1].
     kind : str
-        ``"flutter"`` where oscillations begin to grow or cease to, ``"divergence"`` at zero.
+        ``"flutter"`` where oscillations begin to grow or cease to, ``"divergence"`` at zero (of a multiplier at 1),
+        ``"alternation"`` where a multiplier is -1.
     change : int
-        Change in the number of eigenvalues with positive real part beyond it.
+        Change in the number of unstable eigenvalues beyond it.
     """
 
     value: float
     eigenvalue: complex
     kind: str
     change: int
+
+
+ON_CIRCLE = 1e-7  # distance of a multiplier from the unit circle that may be rounding, also of double ones
+
+
+def outside_circle(w: np.ndarray) -> np.ndarray:
+    """Whether multipliers lie outside the unit circle by more than rounding."""
+    return np.abs(w) > 1.0 + ON_CIRCLE
 
 
 @dataclass(repr=False)
@@ -264,13 +273,16 @@ class RootLocus:
     parameter : str
     values : ndarray (m,)
     eigenvalues : ndarray (m, n) complex [1/s]
-        Each column is a branch, tracked by eigenvalues and shapes; rounding errors are set to 0.
+        Each column is a branch, tracked by eigenvalues and shapes; rounding errors are set to 0. With sampled
+        controllers the multipliers [1] of a deviation in one cycle.
     crossings : list of Crossing
         Every change of stability between the values, found to rounding, not interpolated.
     path_values, path : ndarray (p,), (p, n) complex
         The same branches with values added at crossings and meeting points, as drawn.
     seen_from : tuple of str
         Descriptions of the frames in which motions along it are steady; empty at rest.
+    period : float or None [s]
+        Length of a cycle of sampled controllers; None without.
     """
 
     name: str
@@ -281,20 +293,27 @@ class RootLocus:
     path_values: np.ndarray = field(default_factory=lambda: np.zeros(0))
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), complex))
     seen_from: tuple[str, ...] = ()
+    period: float | None = None
 
     @property
     def unstable(self) -> np.ndarray:
-        """How many eigenvalues have a positive real part, (m,)."""
+        """How many eigenvalues have a positive real part, or multipliers lie outside the unit circle, (m,)."""
+        if self.period is not None:
+            return outside_circle(self.eigenvalues).sum(axis=1)
         return (half_plane(self.eigenvalues) > 0).sum(axis=1)
 
     def lines(self) -> list[tuple[str, str]]:
         """A table for people."""
-        out = [(self.parameter, f"{'unstable':>8}  largest real part [1/s], with imaginary part [rad/s]")]
+        if self.period is None:
+            heading, unit = "largest real part [1/s], with imaginary part [rad/s]", " rad/s"
+        else:
+            heading, unit = f"largest multiplier of a cycle of {self.period:.6g} s", ""
+        out = [(self.parameter, f"{'unstable':>8}  {heading}")]
         for value, w, n in zip(self.values, self.eigenvalues, self.unstable, strict=True):
-            top = max(w, key=lambda x: (x.real, x.imag)) if len(w) else 0j
+            top = max(w, key=lambda x: (x.real if self.period is None else abs(x), x.imag)) if len(w) else 0j
             out.append((f"{value:.6g}", f"{n:8d}  {top.real:.6g}, {abs(top.imag):.6g}"))
         for c in self.crossings:
-            at = f"{self.parameter} = {c.value:.9g}, imaginary part {c.eigenvalue.imag:.6g} rad/s"
+            at = f"{self.parameter} = {c.value:.9g}, imaginary part {c.eigenvalue.imag:.6g}{unit}"
             now = f"{abs(c.change)} {'more' if c.change > 0 else 'fewer'} unstable"
             out.append(("stability changes", f"{at}: {c.kind}, {now}"))
         out += [("seen from", text) for text in self.seen_from]
@@ -310,14 +329,18 @@ class RootLocus:
             "crossings": [c._asdict() | {"eigenvalue": [c.eigenvalue.real, c.eigenvalue.imag]} for c in self.crossings],
             "unstable": self.unstable.tolist(),
             "seen_from": list(self.seen_from),
+            "period": self.period,
         }
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Branches in the complex plane; returns the Matplotlib figure, or writes it to ``path``."""
         from ..view.linear_plots import root_locus_plot
 
-        title = f"{self.name}: eigenvalues over {self.parameter}"
-        return root_locus_plot(self.path, self.path_values, self.parameter, title, path, known=self.crossings)
+        sampled = self.period is not None
+        title = f"{self.name}: {'multipliers of one cycle' if sampled else 'eigenvalues'} over {self.parameter}"
+        return root_locus_plot(
+            self.path, self.path_values, self.parameter, title, path, known=self.crossings, sampled=sampled
+        )
 
     def __repr__(self) -> str:
         return "\n".join(f"{a:>18}  {b}" for a, b in self.lines())

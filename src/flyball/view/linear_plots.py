@@ -229,6 +229,8 @@ def root_locus_plot(
     title: str,
     path: str | os.PathLike | None = None,
     known: Sequence[Any] | None = None,
+    *,
+    sampled: bool = False,
 ) -> Any:
     """Eigenvalues over a gain or parameter as branches, from a cross to a dot; the stable half plane is shaded.
 
@@ -245,6 +247,8 @@ def root_locus_plot(
         Write a PNG, SVG or PDF file instead of returning the figure.
     known : sequence of Crossing, optional
         The crossings, where they need not be interpolated.
+    sampled : bool
+        Whether they are multipliers of a sampled loop: the unit circle is shaded in place of the half plane.
     """
     roots, values = np.asarray(roots), np.asarray(gains, float)
     with plot_style():
@@ -264,7 +268,10 @@ def root_locus_plot(
             for g in own:
                 ax.plot([], [], mark, color="#555555", label=f"{parameter_name} = {g:.4g}")
         ax.legend(**LEGEND_BESIDE)
-        plane(ax)
+        if sampled:
+            unit_circle(ax)
+        else:
+            plane(ax)
         set_title(drawing, title)
         return finish_figure(drawing, path)
 
@@ -312,6 +319,22 @@ def plane(ax: Axes) -> None:
     ax.set_xlabel("real part [1/s]")
     ax.set_ylabel("imaginary part [rad/s]")
     ax.text(0.01, 0.015, "stable", transform=ax.transAxes, color="#3c7a56", fontsize=9)
+
+
+def unit_circle(ax: Axes) -> None:
+    """Draw the axes of the plane of multipliers, and shade the unit circle, within which deviations die away."""
+    from matplotlib.patches import Circle
+
+    ax.add_patch(Circle((0.0, 0.0), 1.0, facecolor=STABLE_COLOR, edgecolor=AXIS_COLOR, linewidth=0.9, zorder=0))
+    ax.axvline(0.0, color=AXIS_COLOR, linewidth=0.9, zorder=1)
+    ax.axhline(0.0, color=AXIS_COLOR, linewidth=0.9, zorder=1)
+    low, high = ax.get_xlim()
+    ax.set_xlim(min(low, -1.1), max(high, 1.1))
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -1.1), max(high, 1.1))
+    ax.set_aspect("equal")
+    ax.set_xlabel("real part")
+    ax.set_ylabel("imaginary part")
 
 
 def _mark_crossings(ax: Axes, roots: np.ndarray, gains: np.ndarray, name: str) -> None:
