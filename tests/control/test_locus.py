@@ -34,9 +34,6 @@ def test_where_it_rests():
 
 
 def test_what_is_refused():
-    pid = fb.PID("pid", setpoint="r", measured="A.displacement", kp=5, ki="ki", period=0.1)
-    with pytest.raises(fb.ModelError, match="PID 'pid', sampled, and root_locus is about continuous time"):
-        slide(pid, ki=1.0, r=0.0).root_locus("ki", [1, 2])
     pid = fb.PID("pid", setpoint="r", measured="A.displacement", kp=5, ki="ki")
     with pytest.raises(fb.NotConverged, match=r"'pid\.integral' changes by 0\.5 in a second"):
         slide(pid, ki=1.0, r=0.5).root_locus("ki", [1, 2])
