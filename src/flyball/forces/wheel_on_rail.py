@@ -11,7 +11,7 @@ from pydantic import BeforeValidator
 
 from ..compiler.formulas import formula
 from ..errors import ModelError
-from ..math.scalar import choose, maximum, unless_zero
+from ..math.scalar import choose, maximum, nonpositive, unless_zero
 from ..math.vec import add, col, cross, dot, scale, sub
 from ..model.element import (
     Direction,
@@ -36,16 +36,19 @@ from .wheel_rail_geometry import (
     DAMPING,
     DATA,
     FRICTION,
+    LAST,
     MODULUS,
-    NOWHERE,
+    PLACES_WIDTH,
     RAIL_WIDTH,
     SHEAR,
     SIDE,
     STANDSTILL,
+    TRAVEL,
     WHEEL_WIDTH,
     beyond_profile,
     contact_place,
-    deepest_places,
+    near_places,
+    place_table,
     rail_axes,
     refined_place,
     track_place,
@@ -56,7 +59,6 @@ SHALLOWEST = 1e-12  # depth [m] for which the ellipse is computed where there is
 LEAST_DAMPING = 1e-6  # of the elastic force: a contact that opens fast does not pull
 LEAST_CROSS_CURVATURE = 0.01  # of that along: profiles that fit each other better are computed as this
 ARC_POINTS = 16  # of each arc
-TRAVEL = 0.03  # [m] by which the wheel's profile may pass the ends of the rail's
 
 
 @formula
@@ -80,12 +82,16 @@ def rolling_speed(par, speed):
 def contact_force(par, F, M, frame, axis, place, data):
     """Return force on the wheel and its point from the wheel's centre in the world, and what curves show of it.
 
-    ``place`` is a place on the wheel's profile, and the depth there; `NOWHERE` if there is none.
+    ``place`` is near its place on the wheel's profile, or beyond that if there is none.
     """
     t, l, n, y, z = frame
-    s = refined_place(par, axis, (y, z), place[0], data)
+    s = refined_place(par, axis, (y, z), place, data)
     p, normal, forward, depth, (A, B) = contact_place(par, axis, (y, z), s, data)
-    depth = choose(place[1] - 0.5 * NOWHERE, depth, NOWHERE + 0.0 * depth)
+    depth = choose(place - par[LAST], -1.0 + 0.0 * depth, depth)
+    if nonpositive(depth):
+        o = 0.0 * depth
+        none = (o, o, o)
+        return none, none, (o, o, o, o, o, o, o, o, o, o, depth)
     touches = choose(depth, 1.0 + 0.0 * depth, 0.0 * depth)
     ended = choose(beyond_profile(par, p[1], data), math.nan + 0.0 * depth, touches)
     touches = choose(depth, ended, touches)
@@ -101,7 +107,8 @@ def contact_force(par, F, M, frame, axis, place, data):
     deep = maximum(depth, SHALLOWEST + 0.0 * depth)
     a, b, elastic = hertz(A, maximum(B, LEAST_CROSS_CURVATURE * A), par[MODULUS], deep)
     load = elastic * maximum(1.0 - par[DAMPING] * dot(up, slip), LEAST_DAMPING + 0.0 * depth)
-    C = kalker_coefficients(data, int(par[DATA].real) + int(par[WHEEL_WIDTH].real) + int(par[RAIL_WIDTH].real), a / b)
+    places = int(par[DATA].real) + int(par[WHEEL_WIDTH].real) + int(par[RAIL_WIDTH].real)
+    C = kalker_coefficients(data, places + 2 * PLACES_WIDTH, a / b)
     fx, fy = polach(par[SHEAR], par[FRICTION] * load, a, b, C, creepages)
     way = choose(speed, 1.0 + 0.0 * depth, -1.0 + 0.0 * depth)
     load, fx, fy = touches * load, touches * fx, touches * fy
@@ -109,7 +116,7 @@ def contact_force(par, F, M, frame, axis, place, data):
     out = par[SIDE]
     return force, arm, (
         load, touches * creepages[0], out * touches * creepages[1], out * touches * creepages[2], fx, out * fy,
-        touches * a, touches * b, touches * s, touches * p[1], touches * depth,
+        touches * a, touches * b, touches * s, touches * p[1], depth,
     )  # fmt: skip
 
 
@@ -126,7 +133,7 @@ def both_contacts(par, F, M, laws, data):
     frame = (t, l, n, y - laws[1], z - laws[0])
     a = scale(par[SIDE], col(M[1], 1))
     axis = (dot(a, t), dot(a, l), dot(a, n))
-    one, other = deepest_places(par, axis, (frame[3], frame[4]), data)
+    one, other = near_places(par, axis, (frame[3], frame[4]), data)
     first = contact_force(par, F, M, frame, axis, one, data)
     second = contact_force(par, F, M, frame, axis, other, data)
     return first, second, frame
@@ -217,8 +224,8 @@ class WheelOnRail(TwoFrameForce):
     A result contains, of the deepest contact: ``normal_force``; creepages ``longitudinal_creepage``,
     ``lateral_creepage`` and ``spin``, ``longitudinal_force`` and ``lateral_force`` of creep on the wheel, in the
     direction of travel and along ``axis``; semi-axes of the ellipse; ``wheel_y`` and ``rail_y`` on the profiles;
-    ``depth``. ``second_force`` and ``second_y`` are of a second contact. ``outward_force`` and ``vertical_force`` are the
-    whole load on the rail, ``derailment_ratio`` their ratio (Nadal's L/V).
+    ``depth``, which is negative for a gap. ``second_force`` and ``second_y`` are of a second contact. ``outward_force``
+    and ``vertical_force`` are the whole load on the rail, ``derailment_ratio`` their ratio (Nadal's L/V).
     """
 
     axis: Direction
@@ -306,7 +313,9 @@ class WheelOnRail(TwoFrameForce):
         if not abs(n.inclination) < 0.5:
             raise ModelError(f"{self.title}: inclination is {n.inclination:g}; it is a slope, such as 1/40")
         if n.roller_radius is not None and (self.vertical is not None or self.lateral is not None):
-            raise ModelError(f"{self.title}: irregularities are functions of the distance along a track; leave them out")
+            raise ModelError(
+                f"{self.title}: irregularities are functions of the distance along a track; leave them out"
+            )
         if n.rail_arcs is not None:
             self._check_arcs(n.rail_arcs)
         for name in ("wheel_profile", "rail_profile"):
@@ -341,13 +350,11 @@ class WheelOnRail(TwoFrameForce):
                 )
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
-        """Return the splines of the profiles of wheel and rail, and those of Kalker's coefficients."""
-        rail = rail_points(n)
-        return (
-            packed_cubic(*wheel_points(n, rail).T),
-            packed_cubic(*rail.T),
-            kalker_table(n.poissons_ratio),
-        )
+        """Return the splines of the profiles of wheel and rail, of contact places, and of Kalker's coefficients."""
+        profiles = profile_splines(n)
+        numbers = tuple(float(x.real) for x in self.parameters(n, 0.0))
+        places = place_table(numbers, tuple(float(x.real) for profile in profiles for x in profile))
+        return (*profiles, list(places), kalker_table(n.poissons_ratio))
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the numbers of the formulas; the engine writes the place of the splines into the first."""
@@ -357,7 +364,7 @@ class WheelOnRail(TwoFrameForce):
         last = min(wheel[-1, 0], rail[-1, 0] + TRAVEL, key=lambda x: x.real)
         strain = 1.0 - n.poissons_ratio * n.poissons_ratio
         numbers = {
-            "widths": (0.0, *(float(len(c)) for c in self.curves(n)[:2])),
+            "widths": (0.0, *(float(len(c)) for c in profile_splines(n))),
             "shape": (n.radius, 0.0 if n.roller_radius is None else 1.0 / n.roller_radius, self._side(n), first, last),
             "elastic": (0.5 * n.youngs_modulus / strain, 0.5 * n.youngs_modulus / (1.0 + n.poissons_ratio)),
             "losses": (n.friction, n.dissipation, n.standstill),
@@ -368,6 +375,12 @@ class WheelOnRail(TwoFrameForce):
     def laws(self) -> tuple[Law | None, ...]:
         """Return the irregularities."""
         return (self.vertical, self.lateral)
+
+
+def profile_splines(n: SimpleNamespace) -> tuple[list[float], list[float]]:
+    """Return the splines of the profiles of wheel and rail."""
+    rail = rail_points(n)
+    return packed_cubic(*wheel_points(n, rail).T), packed_cubic(*rail.T)
 
 
 def rail_points(n: SimpleNamespace) -> np.ndarray:

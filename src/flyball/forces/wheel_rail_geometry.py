@@ -14,18 +14,28 @@ parameters*, J. Southwest Jiaotong University 1, 1984). The surfaces touch where
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import numpy as np
+
 from ..compiler.formulas import formula
-from ..math.scalar import atan2, choose, cos, maximum, minimum, sin, sqrt
+from ..math.scalar import atan2, cos, maximum, minimum, rounded, sin, sqrt
 from ..math.spline import BREAKS, spline
 from ..math.vec import add, col, cross, dot, norm, scale, sub
 
 # numbers of the element, in the order of the formulas' parameters
-DATA, WHEEL_WIDTH, RAIL_WIDTH, RADIUS, BEND, SIDE, FIRST, LAST, MODULUS, SHEAR, FRICTION, DAMPING, STANDSTILL = range(13)
+DATA, WHEEL_WIDTH, RAIL_WIDTH, RADIUS, BEND, SIDE, FIRST, LAST, MODULUS, SHEAR, FRICTION, DAMPING, STANDSTILL = range(
+    13
+)
 CURVATURE, CANT = 13, 14  # of the track, to its left; sine and cosine of the cant
-NODES = 40  # places on the wheel's profile at which the depth is compared
 REFINEMENTS = 4  # steps of Newton's method
+REACH = 6e-3  # [m] by which they may move a place
 LEAST_CURVATURE = 1e-3  # [1/m] of the difference of the profiles, for Newton's method
-NOWHERE = -1e9  # depth [m] that stands for no contact
+TRAVEL = 0.03  # [m] by which a wheel may move across the rail, and its profile pass the ends of the rail's
+SHIFT = 1e-3  # [m] between two rows of the table of places
+TILT, TILTS = 0.02, 4  # [rad] between two rolls of the wheelset in it, and their number on either side
+SAMPLES = 161  # places on the wheel's profile at which the depth is compared
+APART = 5e-3  # [m] between two contacts; nearer local maxima of the depth are one
 
 
 @formula
@@ -131,44 +141,28 @@ def depth_at(par, axis, centre, s, data):
 
 
 @formula
-def deepest_places(par, axis, centre, data):
-    """Return the places s of the wheel's profile that are nearest to the two greatest local maxima of the depth.
-
-    The depth there is returned with each; it is `NOWHERE` where there is no such maximum.
-    """
-    wheel = int(par[DATA].real)
-    rail = wheel + int(par[WHEEL_WIDTH].real)
-    step = (par[LAST] - par[FIRST]) / (NODES - 1.0)
-    none = NOWHERE + 0.0 * centre[0]
-    before, here = none, none
-    one, other = none, none
-    s_one, s_other = 0.0 * none + par[FIRST], 0.0 * none + par[FIRST]
-    for k in range(NODES):
-        s = par[FIRST] + k * step
-        w, w1, _ = spline(data, wheel, s)
-        (x, y, z), _ = trace_point(par, axis, centre, s, w, w1)
-        behind = spline(data, rail, y)[0] - height(par[BEND], x, z)[0]
-        peak = choose(here - before, choose(behind - here, none, here), none)
-        at = s - step
-        deeper, second = peak - one, peak - other
-        other = choose(deeper, one, choose(second, peak, other))
-        s_other = choose(deeper, s_one, choose(second, at, s_other))
-        one = choose(deeper, peak, one)
-        s_one = choose(deeper, at, s_one)
-        before, here = here, behind
-    return (s_one, one), (s_other, other)
-
-
-@formula
 def refined_place(par, axis, centre, guess, data):
     """Return the place of the local maximum of the depth near a place, by Newton's method."""
-    step = (par[LAST] - par[FIRST]) / (NODES - 1.0)
     s = guess
     for _ in range(REFINEMENTS):
         _, first, second = depth_at(par, axis, centre, s, data)
         s = s - first / minimum(second, -LEAST_CURVATURE + 0.0 * second)
-        s = maximum(minimum(s, guess + step), guess - step)
+        s = maximum(minimum(s, guess + REACH), guess - REACH)
     return s
+
+
+@formula
+def near_places(par, axis, centre, data):
+    """Return the places s of the deepest and of a second local maximum of the depth, roughly (`place_table`).
+
+    A place beyond `LAST` stands for none.
+    """
+    at = int(par[DATA].real) + int(par[WHEEL_WIDTH].real) + int(par[RAIL_WIDTH].real)
+    tilt = maximum(minimum(rounded(axis[2] / TILT), TILTS + 0.0 * axis[2]), -TILTS + 0.0 * axis[2])
+    y = centre[0] + par[RADIUS] * axis[2]
+    y = maximum(minimum(y, TRAVEL + 0.0 * y), -TRAVEL + 0.0 * y)
+    x = y + 2.0 * (TRAVEL + SHIFT) * tilt
+    return spline(data, at, x)[0], spline(data, at + PLACES_WIDTH, x)[0]
 
 
 @formula
@@ -199,3 +193,44 @@ def beyond_profile(par, y, data):
     rail = int(par[DATA].real) + int(par[WHEEL_WIDTH].real)
     count = int(data[rail + 1].real)
     return maximum(data[rail + BREAKS] - y, y - data[rail + BREAKS + count - 1])
+
+
+@lru_cache(maxsize=64)
+def place_table(numbers: tuple[float, ...], splines: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the places of the two deepest local maxima of the depth as two piecewise constant splines (`near_places`).
+
+    Their argument counts the lateral places of the wheel for one roll of the wheelset after the other. ``numbers`` are
+    those of the formulas, ``splines`` the profiles of wheel and rail, as real numbers.
+    """
+    data = np.array(splines)
+    s = np.linspace(numbers[FIRST], numbers[LAST], SAMPLES)
+    y = SHIFT * np.arange(-ROWS, ROWS + 1)
+    x, rows = [], []
+    for k in range(-TILTS, TILTS + 1):
+        tilt = k * TILT
+        axis = (0.0, np.sqrt(1.0 - tilt * tilt), tilt)
+        centre = (y[:, None] - numbers[RADIUS] * tilt, 0.0)
+        depth = depth_at(numbers, axis, centre, s, data)[0]
+        x.append(y + 2.0 * (TRAVEL + SHIFT) * k)
+        rows += [_two_deepest(s, d) for d in depth]
+    breaks = np.concatenate(x) - 0.5 * SHIFT
+    out: list[float] = []
+    for column in np.array(rows).T:
+        pieces = np.column_stack([column, np.zeros((len(column), 3))])
+        out += [0.0, float(len(breaks)), *breaks, *pieces[:1].ravel(), *pieces.ravel()]
+    return tuple(float(v) for v in out)
+
+
+def _two_deepest(s: np.ndarray, depth: np.ndarray) -> tuple[float, float]:
+    """Return the places of the two greatest local maxima, as far apart as two contacts are."""
+    k = 1 + np.flatnonzero((depth[1:-1] > depth[:-2]) & (depth[1:-1] >= depth[2:]))
+    k = k[np.argsort(-depth[k], kind="stable")]
+    none = float(s[-1] + 1.0)
+    if not len(k):
+        return none, none
+    other = k[np.abs(s[k] - s[k[0]]) > APART]
+    return float(s[k[0]]), float(s[other[0]]) if len(other) else none
+
+
+ROWS = round(TRAVEL / SHIFT)
+PLACES_WIDTH = 2 + 5 * (2 * ROWS + 1) * (2 * TILTS + 1) + 4

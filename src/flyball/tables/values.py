@@ -23,6 +23,7 @@ from ..math.scalar import real_parts, sqrt
 from ..math.vec import inner_product
 from ..model.body import GROUND
 from ..model.expressions import Expression, number
+from ..model.force import Force
 from ..model.joint import Coupling, Joint
 from ..model.model import Model
 from ..model.snapshot import ResultCache, exact_key
@@ -176,9 +177,7 @@ def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Value
     )  # fmt: skip
     if any(a.tobytes() != b.tobytes() for a, b in same):
         return None
-    forces = _force_parameters(
-        s, pose, curve_at, refresh.table("force_parameters", S.force_parameters, dtype), refresh
-    )
+    forces = _force_parameters(s, pose, curve_at, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
     of_switches = refresh.table("switch_numbers", S.switch_numbers, dtype)
     constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.frame_separation)
     S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
@@ -362,7 +361,8 @@ def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: An
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
     curve_at = {}
-    for e in (*s.model.joints, *s.forces):
+    elements: tuple[Joint | Force, ...] = (*s.model.joints, *s.forces)
+    for e in elements:
         if curves := e.curves(numbers[e.name]):
             curve_at[e.name] = len(const)
             for data in curves:
