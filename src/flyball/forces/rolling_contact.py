@@ -8,7 +8,7 @@ References
 ----------
 H. Hertz, *Über die Berührung fester elastischer Körper*, J. reine angew. Math. 92, 1882; in the form of K. L. Johnson,
 *Contact Mechanics*, 1985, equations 4.24 to 4.28. J. J. Kalker, *Three-Dimensional Elastic Bodies in Rolling Contact*,
-1990, table E3. O. Polach, *A fast wheel-rail forces calculation computer code*, Vehicle System Dynamics 33 (Supplement),
+1990, table E3. O. Polach, *A fast wheel-rail forces calculation computer code*, Vehicle System Dynamics 33 (suppl.),
 1999, pages 728 to 739.
 """
 
