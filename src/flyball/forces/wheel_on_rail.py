@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -40,6 +41,7 @@ from .wheel_rail_geometry import (
     MODULUS,
     PLACES_WIDTH,
     RAIL_WIDTH,
+    SAMPLES,
     SHEAR,
     SIDE,
     STANDSTILL,
@@ -47,6 +49,7 @@ from .wheel_rail_geometry import (
     WHEEL_WIDTH,
     beyond_profile,
     contact_place,
+    depth_at,
     near_places,
     place_table,
     rail_axes,
@@ -197,6 +200,9 @@ class WheelOnRail(TwoFrameForce):
         to the right; straight if not given. Cant is an ``axis`` that is not horizontal.
     inclination : number
         Slope by which the rail leans towards the middle of the track: 1/40.
+    load : number [N]
+        Normal force in the drawn configuration: the rail is raised or lowered so that the wheel presses so on it.
+        If not given, the rail stays where it is drawn.
     conicity : number
         Rise of a conical tread with y.
     wheel_profile : list of (y, z) [m]
@@ -234,6 +240,7 @@ class WheelOnRail(TwoFrameForce):
     roller_radius: Length | None = None
     curve_radius: Length | None = None
     inclination: Ratio = 0.0
+    load: Annotated[Number | None, Unit("N")] = None
     conicity: Ratio | None = None
     wheel_profile: Profile | None = None
     rail_arcs: Profile | None = None
@@ -298,7 +305,7 @@ class WheelOnRail(TwoFrameForce):
     def check(self, n: SimpleNamespace) -> None:
         """Require valid numbers and profiles."""
         positive(self, n, "radius", "roller_radius", "youngs_modulus", "standstill")
-        nonnegative(self, n, "dissipation", "friction")
+        nonnegative(self, n, "dissipation", "friction", "load")
         if not n.friction > 0.0:
             raise ModelError(f"{self.title}: friction is 0; give a small one, such as 0.001")
         if not 0.0 <= n.poissons_ratio <= 0.5:
@@ -360,13 +367,13 @@ class WheelOnRail(TwoFrameForce):
         """Return the numbers of the formulas; the engine writes the place of the splines into the first."""
         rail = rail_points(n)
         wheel = wheel_points(n, rail)
+        elastic = moduli(n)
         first = max(wheel[0, 0], rail[0, 0] - TRAVEL, key=lambda x: x.real)
         last = min(wheel[-1, 0], rail[-1, 0] + TRAVEL, key=lambda x: x.real)
-        strain = 1.0 - n.poissons_ratio * n.poissons_ratio
         numbers = {
             "widths": (0.0, *(float(len(c)) for c in profile_splines(n))),
-            "shape": (n.radius, 0.0 if n.roller_radius is None else 1.0 / n.roller_radius, self._side(n), first, last),
-            "elastic": (0.5 * n.youngs_modulus / strain, 0.5 * n.youngs_modulus / (1.0 + n.poissons_ratio)),
+            "shape": (n.radius, bend(n), self._side(n), first, last),
+            "elastic": elastic,
             "losses": (n.friction, n.dissipation, n.standstill),
             "curve": (0.0 if n.curve_radius is None else 1.0 / n.curve_radius, *self._axes(n)[2, 1:]),
         }
@@ -377,10 +384,50 @@ class WheelOnRail(TwoFrameForce):
         return (self.vertical, self.lateral)
 
 
+def moduli(n: SimpleNamespace) -> tuple[float, float]:
+    """Return E* of Hertz's theory for two bodies of the material, and its shear modulus."""
+    nu = n.poissons_ratio
+    return 0.5 * n.youngs_modulus / (1.0 - nu * nu), 0.5 * n.youngs_modulus / (1.0 + nu)
+
+
+SHAPING = (
+    "radius", "roller_radius", "conicity", "wheel_profile", "rail_arcs", "rail_profile", "inclination", "load", "youngs_modulus",
+    "poissons_ratio",
+)  # fmt: skip
+"""Fields that the splines of the profiles depend on."""
+
+
+def bend(n: SimpleNamespace) -> Any:
+    """Return the curvature of a roller; 0 for a rail."""
+    return 0.0 if n.roller_radius is None else 1.0 / n.roller_radius
+
+
 def profile_splines(n: SimpleNamespace) -> tuple[list[float], list[float]]:
-    """Return the splines of the profiles of wheel and rail."""
+    """Return the splines of the profiles of wheel and rail; the rail is raised so that it bears the given load."""
+    return _profile_splines(tuple(getattr(n, name) for name in SHAPING))
+
+
+@lru_cache(maxsize=64)
+def _profile_splines(values: tuple) -> tuple[list[float], list[float]]:
+    n = SimpleNamespace(**dict(zip(SHAPING, values, strict=True)))
     rail = rail_points(n)
-    return packed_cubic(*wheel_points(n, rail).T), packed_cubic(*rail.T)
+    wheel = packed_cubic(*wheel_points(n, rail).T)
+    return wheel, packed_cubic(*(rail + np.array([0.0, _rise(n, rail, wheel)])).T)
+
+
+def _rise(n: SimpleNamespace, rail: np.ndarray, wheel: list[float]) -> Any:
+    """Return by how much a rail is raised so that the contact beneath the wheel's centre has the load."""
+    if n.load is None:
+        return 0.0
+    data = np.array([*wheel, *packed_cubic(*rail.T)])
+    par = (0.0, float(len(wheel)), 0.0, n.radius, bend(n))
+    axis, centre = (0.0, 1.0, 0.0), (0.0, n.radius)
+    s = np.linspace(rail[0, 0].real, rail[-1, 0].real, SAMPLES)
+    depth = depth_at(tuple(x.real for x in par), axis, (0.0, n.radius.real), s, data.real)[0]
+    at = refined_place(par, axis, centre, float(s[np.argmax(depth)]), data)
+    _, normal, _, deep, (A, B) = contact_place(par, axis, centre, at, data)
+    _, _, force = hertz(A, maximum(B, LEAST_CROSS_CURVATURE * A), moduli(n)[0], 1.0)
+    return ((n.load / force) ** (2.0 / 3.0) - deep) / normal[2]
 
 
 def rail_points(n: SimpleNamespace) -> np.ndarray:
