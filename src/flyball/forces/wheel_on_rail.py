@@ -391,8 +391,8 @@ def moduli(n: SimpleNamespace) -> tuple[float, float]:
 
 
 SHAPING = (
-    "radius", "roller_radius", "conicity", "wheel_profile", "rail_arcs", "rail_profile", "inclination", "load", "youngs_modulus",
-    "poissons_ratio",
+    "radius", "roller_radius", "conicity", "wheel_profile", "rail_arcs", "rail_profile", "inclination", "load",
+    "youngs_modulus", "poissons_ratio",
 )  # fmt: skip
 """Fields that the splines of the profiles depend on."""
 
