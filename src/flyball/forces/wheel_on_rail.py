@@ -50,6 +50,7 @@ from .wheel_rail_geometry import (
     beyond_profile,
     contact_place,
     depth_at,
+    greatest_depth,
     near_places,
     place_table,
     rail_axes,
@@ -88,13 +89,15 @@ def contact_force(par, F, M, frame, axis, place, data):
     ``place`` is near its place on the wheel's profile, or beyond that if there is none.
     """
     t, l, n, y, z = frame
+    o = 0.0 * y
+    none = (o, o, o), (o, o, o), (o, o, o, o, o, o, o, o, o, o, o)
+    if nonpositive(choose(place - par[LAST], o - 1.0, greatest_depth(par, axis, (y, z), place, data))):
+        return none
     s = refined_place(par, axis, (y, z), place, data)
     p, normal, forward, depth, (A, B) = contact_place(par, axis, (y, z), s, data)
-    depth = choose(place - par[LAST], -1.0 + 0.0 * depth, depth)
+    depth = choose(place - par[LAST], o - 1.0, depth)
     if nonpositive(depth):
-        o = 0.0 * depth
-        none = (o, o, o)
-        return none, none, (o, o, o, o, o, o, o, o, o, o, depth)
+        return none
     touches = choose(depth, 1.0 + 0.0 * depth, 0.0 * depth)
     ended = choose(beyond_profile(par, p[1], data), math.nan + 0.0 * depth, touches)
     touches = choose(depth, ended, touches)
@@ -119,7 +122,8 @@ def contact_force(par, F, M, frame, axis, place, data):
     out = par[SIDE]
     return force, arm, (
         load, touches * creepages[0], out * touches * creepages[1], out * touches * creepages[2], fx, out * fy,
-        touches * a, touches * b, touches * s, touches * p[1], depth,
+        touches * a, touches * b, touches * s, touches * p[1],
+        touches * deep,
     )  # fmt: skip
 
 
@@ -230,7 +234,7 @@ class WheelOnRail(TwoFrameForce):
     A result contains, of the deepest contact: ``normal_force``; creepages ``longitudinal_creepage``,
     ``lateral_creepage`` and ``spin``, ``longitudinal_force`` and ``lateral_force`` of creep on the wheel, in the
     direction of travel and along ``axis``; semi-axes of the ellipse; ``wheel_y`` and ``rail_y`` on the profiles;
-    ``depth``, which is negative for a gap. ``second_force`` and ``second_y`` are of a second contact. ``outward_force``
+    ``depth``. ``second_force`` and ``second_y`` are of a second contact. ``outward_force``
     and ``vertical_force`` are the whole load on the rail, ``derailment_ratio`` their ratio (Nadal's L/V).
     """
 

@@ -31,6 +31,7 @@ CURVATURE, CANT = 13, 14  # of the track, to its left; sine and cosine of the ca
 REFINEMENTS = 4  # steps of Newton's method
 REACH = 6e-3  # [m] by which they may move a place
 LEAST_CURVATURE = 1e-3  # [1/m] of the difference of the profiles, for Newton's method
+MARGIN = 1e-3  # [m] of the depth, by which a contact that is surely open is known before its place is computed
 TRAVEL = 0.03  # [m] by which a wheel may move across the rail, and its profile pass the ends of the rail's
 SHIFT = 1e-3  # [m] between two rows of the table of places
 TILT, TILTS = 0.02, 4  # [rad] between two rolls of the wheelset in it, and their number on either side
@@ -138,6 +139,13 @@ def depth_at(par, axis, centre, s, data):
     first = f1 * dy - along * (axis[0] - w1 * e[0]) - above * (axis[2] - w1 * e[2])
     second = f2 * dy * dy + w2 * (above * e[2] - f1 * e[1])
     return f - up, first, second
+
+
+@formula
+def greatest_depth(par, axis, centre, guess, data):
+    """Return a number that is greater than the local maximum of the depth near a place, from a parabola there."""
+    depth, first, second = depth_at(par, axis, centre, guess, data)
+    return depth - 0.5 * first * first / minimum(second, -LEAST_CURVATURE + 0.0 * second) + MARGIN
 
 
 @formula
