@@ -98,9 +98,7 @@ def contact_force(par, F, M, frame, axis, place, data):
     depth = choose(place - par[LAST], o - 1.0, depth)
     if nonpositive(depth):
         return none
-    touches = choose(depth, 1.0 + 0.0 * depth, 0.0 * depth)
-    ended = choose(beyond_profile(par, p[1], data), math.nan + 0.0 * depth, touches)
-    touches = choose(depth, ended, touches)
+    ended = choose(beyond_profile(par, p[1], data), math.nan + o, o)
     arm = combined((t, l, n), (p[0], p[1] - y, p[2] - z))
     up, ahead = combined((t, l, n), normal), combined((t, l, n), forward)
     aside = scale(par[SIDE], combined((t, l, n), cross(normal, forward)))  # to the left, also where l is to the right
@@ -113,18 +111,23 @@ def contact_force(par, F, M, frame, axis, place, data):
     deep = maximum(depth, SHALLOWEST + 0.0 * depth)
     a, b, elastic = hertz(A, maximum(B, LEAST_CROSS_CURVATURE * A), par[MODULUS], deep)
     load = elastic * maximum(1.0 - par[DAMPING] * dot(up, slip), LEAST_DAMPING + 0.0 * depth)
-    places = int(par[DATA].real) + int(par[WHEEL_WIDTH].real) + int(par[RAIL_WIDTH].real)
-    C = kalker_coefficients(data, places + 2 * PLACES_WIDTH, a / b)
+    table = int(par[DATA].real) + int(par[WHEEL_WIDTH].real) + int(par[RAIL_WIDTH].real) + 2 * PLACES_WIDTH
+    C = kalker_coefficients(data, table, a / b)
     fx, fy = polach(par[SHEAR], par[FRICTION] * load, a, b, C, creepages)
     way = choose(speed, 1.0 + 0.0 * depth, -1.0 + 0.0 * depth)
-    load, fx, fy = touches * load, touches * fx, touches * fy
+    load, out = load + ended, par[SIDE]
     force = add(scale(load, up), add(scale(way * fx, ahead), scale(fy, aside)))
-    out = par[SIDE]
-    return force, arm, (
-        load, touches * creepages[0], out * touches * creepages[1], out * touches * creepages[2], fx, out * fy,
-        touches * a, touches * b, touches * s, touches * p[1],
-        touches * deep,
-    )  # fmt: skip
+    c, u = when(depth, (creepages[0], out * creepages[1], out * creepages[2])), when(depth, (load, fx, out * fy))
+    e, q = when(depth, (a, b, deep)), when(depth, (s, p[1], s))
+    shown = (u[0], c[0], c[1], c[2], u[1], u[2], e[0], e[1], q[0], q[1], e[2])
+    return when(depth, force), when(depth, arm), shown
+
+
+@formula
+def when(x, a):
+    """Return the vector a where x is greater than zero, else zeros."""
+    o = 0.0 * x
+    return choose(x, a[0], o), choose(x, a[1], o), choose(x, a[2], o)
 
 
 @formula
@@ -194,7 +197,9 @@ class WheelOnRail(TwoFrameForce):
     axis : direction
         From the middle of the track to the rail: the direction of the axle away from the flange.
     direction : direction
-        Of the track, perpendicular to ``axis``; (1, 0, 0) if not given. Upwards is (0, 0, 1), or the nearest direction.
+        Of the track, horizontal and perpendicular to ``axis``; (1, 0, 0) if not given.
+    normal : direction
+        Vertical direction, upwards; (0, 0, 1) if not given.
     radius : number [m]
         Radius of the wheel at y = 0; its centre is above ``at``.
     roller_radius : number [m]
@@ -241,6 +246,7 @@ class WheelOnRail(TwoFrameForce):
     axis: Direction
     radius: Length
     direction: Direction = (1.0, 0.0, 0.0)
+    normal: Direction = (0.0, 0.0, 1.0)
     roller_radius: Length | None = None
     curve_radius: Length | None = None
     inclination: Ratio = 0.0
@@ -298,13 +304,18 @@ class WheelOnRail(TwoFrameForce):
                 f"direction of the track"
             )
         up = np.array(cross(t, out))
-        up = up if up[2].real >= 0.0 else -up
+        up = up if (up @ vector(n.normal, False, f"normal of {self.title}", direction=True)).real >= 0.0 else -up
         return np.column_stack([t, np.array(cross(up, t)), up])
 
     def _side(self, n: SimpleNamespace) -> float:
         """Return 1 for a rail left of the middle, -1 for one right of it."""
         out = vector(n.axis, False, f"axis of {self.title}", direction=True)
         return 1.0 if (self._axes(n)[:, 1] @ out).real > 0.0 else -1.0
+
+    def _cant(self, n: SimpleNamespace) -> Any:
+        """Return sine and cosine of the angle by which the track rises to its left."""
+        R, up = self._axes(n), vector(n.normal, False, f"normal of {self.title}", direction=True)
+        return np.array([up @ R[:, 1], up @ R[:, 2]])
 
     def check(self, n: SimpleNamespace) -> None:
         """Require valid numbers and profiles."""
@@ -379,7 +390,7 @@ class WheelOnRail(TwoFrameForce):
             "shape": (n.radius, bend(n), self._side(n), first, last),
             "elastic": elastic,
             "losses": (n.friction, n.dissipation, n.standstill),
-            "curve": (0.0 if n.curve_radius is None else 1.0 / n.curve_radius, *self._axes(n)[2, 1:]),
+            "curve": (0.0 if n.curve_radius is None else 1.0 / n.curve_radius, *self._cant(n)),
         }
         return tuple(x for part in numbers.values() for x in part)
 
