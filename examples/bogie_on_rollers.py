@@ -57,9 +57,9 @@ def wheel_profile(conicity: float) -> np.ndarray:
     return np.column_stack([y, z - np.interp(0.0, y, z)])
 
 
-def revolved(outline: np.ndarray, side: float) -> fb.Mesh:
+def revolved(outline: np.ndarray, side: float, place: float = 0.0) -> fb.Mesh:
     """The solid of revolution about y of an outline (y, radius), around in order; mirrored for the right side."""
-    n, turns = len(outline), 48
+    n, turns = len(outline), 60
     angle = np.linspace(0, 2 * np.pi, turns, endpoint=False)
     y, r = outline.T
     around = np.broadcast_arrays(r * np.cos(angle)[:, None], side * y, r * np.sin(angle)[:, None])
@@ -70,36 +70,54 @@ def revolved(outline: np.ndarray, side: float) -> fb.Mesh:
             a, b = k * n + j, k * n + (j + 1) % n
             c, d = (k + 1) % turns * n + j, (k + 1) % turns * n + (j + 1) % n
             faces += [(a, b, c), (b, d, c)] if side > 0 else [(a, c, b), (b, c, d)]
-    return fb.Mesh(vertices=corners, faces=faces, looks=True)
+    return fb.Mesh(vertices=corners, faces=faces, position=(0, place, 0), looks=True)
 
 
-def wheelset_shapes(radius: float, half_gauge: float, conicity: float) -> list:
-    """An axle with two wheels of the profile; a bore shows that they turn."""
-    profile = wheel_profile(conicity)[::8]
+def wheelset_shapes(radius: float, half_gauge: float, conicity: float) -> list[fb.Mesh | fb.Rod]:
+    """An axle with two wheels of the profile, each with a mark that shows how it turns."""
+    profile = wheel_profile(conicity)[::3]
     rim = np.column_stack([profile[:, 0], radius - profile[:, 1]])
-    hub = [(FACE, 0.8 * radius), (0.03, 0.75 * radius), (0.04, 0.1), (-0.06, 0.1), (0.0, 0.75 * radius), (BACK, 0.8 * radius)]
-    shapes = [fb.Rod(start=(0, -1.1, 0), end=(0, 1.1, 0), radius=0.08, looks=True)]
+    inside, hub = 0.86 * radius, 0.12
+    web = [
+        (FACE, inside),
+        (0.03, 0.8 * radius),
+        (0.04, 0.16),
+        (0.06, hub),
+        (-0.06, hub),
+        (-0.01, 0.8 * radius),
+        (BACK, inside),
+    ]
+    shapes: list[fb.Mesh | fb.Rod] = [fb.Rod(start=(0, -1.1, 0), end=(0, 1.1, 0), radius=0.08, looks=True)]
     for side in (1.0, -1.0):
-        wheel = revolved(np.vstack([rim, hub]), side)
-        shapes.append(fb.Mesh(vertices=wheel.vertices, faces=wheel.faces, position=(0, side * half_gauge, 0), looks=True))
-        shapes.append(fb.Rod(start=(0, side * 0.79, 0.25), end=(0, side * 0.81, 0.25), radius=0.03, looks=True))
+        shapes.append(revolved(np.vstack([rim, web]), side, side * half_gauge))
+        shapes.append(fb.Rod(start=(0, side * 0.76, 0.28), end=(0, side * 0.8, 0.28), radius=0.03, looks=True))
     return shapes
 
 
-def roller(radius: float) -> list:
-    """A roller with a rail's head."""
+def roller(radius: float) -> list[fb.Mesh | fb.Rod]:
+    """A roller with a rail's head, and a mark."""
     y = np.linspace(-0.036, 0.036, 9)
     head = np.column_stack([y, radius - y**2 / 0.6])
-    web = [(0.036, 0.8 * radius), (0.02, 0.75 * radius), (0.02, 0.12), (0.06, 0.1), (-0.06, 0.1), (-0.02, 0.12), (-0.02, 0.75 * radius), (-0.036, 0.8 * radius)]
-    axle = fb.Rod(start=(0, -0.2, 0), end=(0, 0.2, 0), radius=0.05, looks=True)
+    inside = 0.88 * radius
+    web = [
+        (0.036, inside),
+        (0.015, 0.84 * radius),
+        (0.02, 0.16),
+        (0.08, 0.1),
+        (-0.08, 0.1),
+        (-0.02, 0.16),
+        (-0.015, 0.84 * radius),
+        (-0.036, inside),
+    ]
+    axle = fb.Rod(start=(0, -0.25, 0), end=(0, 0.25, 0), radius=0.06, looks=True)
     mark = fb.Rod(start=(0, -0.03, 0.35), end=(0, 0.03, 0.35), radius=0.03, looks=True)
     return [revolved(np.vstack([head, web]), 1.0), axle, mark]
 
 
-def frame_shapes(half_base: float) -> list:
-    """Two side beams and a cross beam."""
-    beams = [fb.Box(edges=(2 * half_base + 0.7, 0.16, 0.22), position=(0, y, 0.2), looks=True) for y in (-1, 1)]
-    return [*beams, fb.Box(edges=(0.5, 1.9, 0.22), position=(0, 0, 0.2), looks=True)]
+def frame_shapes(half_base: float) -> list[fb.Box]:
+    """Two side beams and a cross beam, from the frame's centre of mass."""
+    beams = [fb.Box(edges=(2 * half_base + 0.7, 0.16, 0.2), position=(0, y, 0), looks=True) for y in (-1, 1)]
+    return [*beams, fb.Box(edges=(0.5, 1.9, 0.2), position=(0, 0, 0), looks=True)]
 
 
 def add_wheelset(m: fb.Mechanism, k: int, x: str, shapes: list, rollers: bool) -> None:
@@ -144,10 +162,19 @@ def mechanism(rollers: bool = True, **parameters: float | str) -> fb.Mechanism:
     if not rollers:
         car = "car"
         m.add(fb.Body(car, mass=1e4, inertia=(1e4, 1e5, 1e5), position=above, velocity=ahead))
-        m.add(fb.Prismatic("line", "ground", car, at=above, axis=(1, 0, 0)), fb.Driver("run", "line.displacement", "speed*t"))
+        m.add(
+            fb.Prismatic("line", "ground", car, at=above, axis=(1, 0, 0)),
+            fb.Driver("run", "line.displacement", "speed*t"),
+        )
         m.add(fb.Ground("track", shape=RAILS, color="#5d6b78"))
-    side = {"stiffness": ("2*secondary", "2*secondary", 0), "damping": ("2*secondary_damping", "2*secondary_damping", 0)}
-    yaw = {"torsional_stiffness": (0, 0, "2*secondary*half_width**2"), "torsional_damping": (0, 0, "2*secondary_damping*half_width**2")}
+    side = {
+        "stiffness": ("2*secondary", "2*secondary", 0),
+        "damping": ("2*secondary_damping", "2*secondary_damping", 0),
+    }
+    yaw = {
+        "torsional_stiffness": (0, 0, "2*secondary*half_width**2"),
+        "torsional_damping": (0, 0, "2*secondary_damping*half_width**2"),
+    }
     m.add(fb.Bushing("secondary", car, "frame", at=above, **side, **yaw))
     gust = "gust*(step5(t, 0.1, 0, 0.15, 1) - step5(t, 0.25, 0, 0.3, 1))"
     m.add(fb.PointForce("weight and wind", "frame", force=(0, gust, "-car_weight")))
@@ -171,9 +198,22 @@ def growth(rollers: bool, speed: float) -> float:
     return float(m.linearize(about=m.equilibrium(turning=turning(rollers))).eigenvalues.real.max())
 
 
+def critical_speed(rollers: bool) -> float:
+    """Speed [m/s] at which hunting begins to grow, by bisection."""
+    low, high = 30.0, 90.0
+    while high - low > 0.05:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if growth(rollers, middle) > 1e-6 else (middle, high)
+    return low
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     folder.mkdir(parents=True, exist_ok=True)
-    for rollers in (False, True):
-        m = mechanism(rollers)
-        ...
+    for rollers, where in ((False, "on track"), (True, "on rollers")):
+        print(f"critical speed {where}: {3.6 * critical_speed(rollers):.1f} km/h")
+    run = mechanism().simulate(3, outputs=901, rtol=1e-5)
+    print(run.health)
+    last = run["wheelset 1.y"][-300:]
+    print(f"limit cycle at {PARAMETERS['speed']}: {1e3 * abs(last).max():.1f} mm")
+    run.to_html(folder / "bogie_on_rollers.html")
