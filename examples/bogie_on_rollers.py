@@ -200,7 +200,7 @@ def growth(rollers: bool, speed: float) -> float:
 
 def critical_speed(rollers: bool) -> float:
     """Speed [m/s] at which hunting begins to grow, by bisection."""
-    low, high = 30.0, 90.0
+    low, high = 45.0, 60.0
     while high - low > 0.05:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if growth(rollers, middle) > 1e-6 else (middle, high)

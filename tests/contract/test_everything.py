@@ -15,7 +15,14 @@ from flyball.model.model_files import dumps, loads
 from tests.layers import both_layers, started
 
 pytestmark = both_layers
-SOFT = {"youngs_modulus": 1e4, "inclination": 0.05, "load": 0.5, "dissipation": 0.1, "rail_arcs": [(5.0, 2.0)]}
+SOFT = {
+    "youngs_modulus": 1e4,
+    "inclination": 0.05,
+    "load": 0.5,
+    "dissipation": 0.1,
+    "friction": 0.1,
+    "rail_arcs": [(5.0, 2.0)],
+}
 
 
 @lru_cache(maxsize=1)

@@ -124,7 +124,15 @@ def with_forces(where):
         m.add(fb.PointTorque("turn", "b", torque=(1.0, "t", 2.0)))
         m.add(
             fb.WheelOnRail(
-                "roll", "a", "b", at=q, axis=(0, 1, 0), radius=0.4, conicity=0.1, roller_radius=0.5, load=9.0
+                "roll",
+                "a",
+                "b",
+                at=q,
+                axis=(0, 1, 0),
+                radius=0.4,
+                conicity=0.1,
+                roller_radius=0.5,
+                rail_arcs=[(0.3, 0.2)],
             )
         )
         cone, head = ([(0.01 * k, z * k * abs(k)) for k in range(-4, 5)] for z in (0.001, -0.002))

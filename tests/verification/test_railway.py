@@ -1,9 +1,14 @@
 """Wheelsets on track and on rollers: Klingel's wavelength, curving, irregular track, a lifted wheel."""
 
+import runpy
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import flyball as fb
+from flyball.forces.rolling_contact import hertz, kalker_coefficients, kalker_table
+from tests.mechanisms import EXAMPLES
 
 RADIUS, HALF, CONE, HEAD, SPEED = 0.46, 0.75, 0.05, 0.3, 2.0
 LOAD = (1500.0 + 50.0) * 9.81 / 2.0
@@ -93,3 +98,55 @@ def test_the_end_of_a_profile_is_told():
     m.add(fb.PointForce("push", "box", force=(0, 3e4, 0)))
     with pytest.raises(fb.SimulationError, match=r"WheelOnRail .*reached the end of the rail's profile"):
         m.simulate(2.0)
+
+
+BOGIE = runpy.run_path(str(EXAMPLES / "bogie_on_rollers.py"))
+
+
+def kalker_matrix(speed):
+    """A (12 x 12) of the bogie on track: lateral displacement and yaw of both wheelsets and the frame, and their rates.
+
+    Linear theory (A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics*, 2003, chapter 2): a cone of slope d on heads
+    of the radius h rolls by G y, G = d / (e - r d), when it moves by y, and its contacts then slip by y e / (e - r d).
+    """
+    n = BOGIE["mechanism"]().environment()
+    r, e, d, h = (n[k] for k in ("wheel_radius", "half_gauge", "conicity", "head"))
+    load = ((n["frame_mass"] + 2 * n["wheelset_mass"] + 2 * n["box_mass"]) * 9.81 + n["car_weight"]) / 4
+    modulus, shear = 0.5 * 210e9 / (1 - 0.28**2), 0.5 * 210e9 / 1.28
+    depth = (load / hertz(0.5 / r, 0.5 / h, modulus, 1.0)[2]) ** (2 / 3)
+    a, b, _ = hertz(0.5 / r, 0.5 / h, modulus, depth)
+    C = kalker_coefficients(np.array(kalker_table(0.28)), 0, a / b)
+    f11, f22, f23 = shear * a * b * C[0], shear * a * b * C[1], shear * (a * b) ** 1.5 * C[2]
+    roll, slip, cone = d / (e - r * d), e / (e - r * d), d * (e + h * d) / (e - r * d)
+    secondary, damping = 2 * n["secondary"], 2 * n["secondary_damping"]
+    K, D = np.diag([0, 0, 0, 0, secondary, secondary]), np.diag([0, 0, 0, 0, damping, damping])
+    M = np.diag([*[n["wheelset_mass"] + n["box_mass"] + 900 * roll**2, 920] * 2, n["frame_mass"], 3500])
+    one = np.eye(6)
+    for k, side in ((0, 1), (2, -1)):
+        y, yaw = one[k], one[k + 1]
+        L = slip * y
+        D = D + 2 * f22 / speed * np.outer(L, L) + 2 * f11 * e**2 / speed * np.outer(yaw, yaw)
+        K = K - 2 * f22 * np.outer(L, yaw) + 2 * f11 * e * cone / r * np.outer(yaw, y)
+        D = D + 2 * f23 / speed * (np.outer(L, yaw) - np.outer(yaw, L))  # spin
+        K = K + 2 * f23 * (np.outer(yaw, yaw) - roll / r * np.outer(L, y))
+        K = K + 2 * load * (roll * cone / d * np.outer(y, y) - e * d * np.outer(yaw, yaw))  # gravity
+        lateral, turn = y - one[4] - side * n["half_base"] * one[5], yaw - one[5]
+        K = K + 2 * n["primary_y"] * np.outer(lateral, lateral) + 2 * n["primary_x"] * np.outer(turn, turn)
+    return np.block([[np.zeros((6, 6)), one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+
+
+def test_critical_speed_of_the_bogie_against_matrices_and_on_rollers():
+    """Within 3 %, for the matrices know no roll of the frame; on rollers it is lower."""
+    critical = brentq(lambda v: np.linalg.eigvals(kalker_matrix(v)).real.max(), 20, 100)
+    assert critical == pytest.approx(50.8, abs=0.1)
+    assert BOGIE["growth"](False, critical) < 1e-6
+    assert BOGIE["growth"](True, critical) > 0.1
+    assert BOGIE["growth"](False, 1.03 * critical) > 0.01
+
+
+@pytest.mark.parametrize(("speed", "least", "most"), [("160 km/h", 0.0, 3e-4), ("200 km/h", 8e-3, 11e-3)])
+def test_the_bogie_hunts_between_its_flanges_above_the_critical_speed_only(speed, least, most):
+    run = BOGIE["mechanism"](speed=speed).simulate(4.0, outputs=801, rtol=1e-4)
+    assert least <= np.abs(run["wheelset 1.y"][-200:]).max() < most
+    limit = 0.35 * run["left 1.normal_force"] + 1.0
+    assert (np.hypot(run["left 1.longitudinal_force"], run["left 1.lateral_force"]) < 1.2 * limit).all()
