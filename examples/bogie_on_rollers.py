@@ -181,6 +181,7 @@ def mechanism(rollers: bool = True, **parameters: float | str) -> fb.Mechanism:
     shapes = wheelset_shapes(n["wheel_radius"], n["half_gauge"], n["conicity"])
     for k, x in ((1, "half_base"), (2, "-half_base")):
         add_wheelset(m, k, x, shapes, rollers)
+        m.add(fb.Sensor(f"lateral_{k}", f"wheelset {k}.y"))
     return m
 
 

@@ -63,6 +63,7 @@ SHALLOWEST = 1e-12  # depth [m] for which the ellipse is computed where there is
 LEAST_DAMPING = 1e-6  # of the elastic force: a contact that opens fast does not pull
 LEAST_CROSS_CURVATURE = 0.01  # of that along: profiles that fit each other better are computed as this
 ARC_POINTS = 16  # of each arc
+CONE_WIDTH = 0.2  # [m] of a cone on either side of its origin
 
 
 @formula
@@ -381,7 +382,7 @@ class WheelOnRail(TwoFrameForce):
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the numbers of the formulas; the engine writes the place of the splines into the first."""
         rail = rail_points(n)
-        wheel = wheel_points(n, rail)
+        wheel = wheel_points(n)
         elastic = moduli(n)
         first = max(wheel[0, 0], rail[0, 0] - TRAVEL, key=lambda x: x.real)
         last = min(wheel[-1, 0], rail[-1, 0] + TRAVEL, key=lambda x: x.real)
@@ -426,7 +427,7 @@ def profile_splines(n: SimpleNamespace) -> tuple[list[float], list[float]]:
 def _profile_splines(values: tuple) -> tuple[list[float], list[float]]:
     n = SimpleNamespace(**dict(zip(SHAPING, values, strict=True)))
     rail = rail_points(n)
-    wheel = packed_cubic(*wheel_points(n, rail).T)
+    wheel = packed_cubic(*wheel_points(n).T)
     return wheel, packed_cubic(*(rail + np.array([0.0, _rise(n, rail, wheel)])).T)
 
 
@@ -466,9 +467,9 @@ def _arc_points(n: SimpleNamespace) -> np.ndarray:
     return np.vstack([right[:0:-1] * np.array([-1.0, 1.0]), right])
 
 
-def wheel_points(n: SimpleNamespace, rail: np.ndarray) -> np.ndarray:
+def wheel_points(n: SimpleNamespace) -> np.ndarray:
     """Return points (k, 2) of a wheel's profile."""
     if n.wheel_profile is not None:
         return np.array(n.wheel_profile)
-    y = np.linspace(rail[0, 0].real - TRAVEL, rail[-1, 0].real + TRAVEL, 4)
+    y = np.linspace(-CONE_WIDTH, CONE_WIDTH, 4)
     return np.column_stack([y, n.conicity * y])
