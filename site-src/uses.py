@@ -71,6 +71,9 @@ USES = {
     "SpringDamper": (
         'fb.SpringDamper("spring", "ground", "slider", at=((1.2, 0), (0.7, 0)), stiffness=200, damping=1, length=0.5)'
     ),
+    "WheelOnRail": (
+        'fb.WheelOnRail("left", "ground", "wheelset", at=(0, 0.75, 0), axis=(0, 1, 0), radius=0.46, conicity=0.05)'
+    ),
     "TorsionalSpringDamper": 'fb.TorsionalSpringDamper("spring", "A", stiffness="20 N*m/rad", damping=0.1)',
     # stops
     "Backlash": 'fb.Backlash("teeth", ("A.angle", "B.angle"), weights=(20, 60), gap="2 deg")',

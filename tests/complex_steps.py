@@ -12,6 +12,8 @@ import numpy as np
 
 import flyball as fb
 from flyball.errors import ModelError
+from flyball.forces.wheel_rail_geometry import PLACES_WIDTH
+from flyball.forces.wheel_rail_geometry import RAIL_WIDTH as WHEEL_RAIL
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
 from flyball.model.snapshot import CATEGORIES
@@ -98,8 +100,18 @@ def tables(x: Values) -> Tables:
     out |= {scaled: X.inverse_inertia, "scale of excess": X.excess_inertia}
     out |= {"scale": np.r_[X.inverse_reference_inertia, S.scales.length], "gravity": S.gravity}
     out |= {"frames": np.column_stack([S.frames.position, S.frames.rotation])}
-    out |= {name: getattr(S, name) for name in ("term_parameters", "force_parameters", "const")}
+    out |= {name: getattr(S, name) for name in ("term_parameters", "force_parameters")} | {"const": _constants(x)}
     return out | {"q": x.q, "v": x.v}
+
+
+def _constants(x: Values) -> np.ndarray:
+    """The constants without those that only begin a search: roughly known places of wheels' contacts, which jump."""
+    out = x.system.const.copy()
+    for k, e in enumerate(x.structure.forces):
+        if isinstance(e, fb.WheelOnRail):
+            at = int(x.system.force_parameters[k, : WHEEL_RAIL + 1].real.sum())
+            out[at : at + 2 * PLACES_WIDTH] = 0.0
+    return out
 
 
 def about_z(angle: float) -> np.ndarray:

@@ -20,7 +20,8 @@ Describe a mechanism
                   length is a coordinate
     couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
-                  Actuator, Motor, Rubber, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
+                  Actuator, Motor, Rubber, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque,
+                  WheelOnRail
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,

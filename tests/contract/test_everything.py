@@ -15,6 +15,14 @@ from flyball.model.model_files import dumps, loads
 from tests.layers import both_layers, started
 
 pytestmark = both_layers
+SOFT = {
+    "youngs_modulus": 1e4,
+    "inclination": 0.05,
+    "load": 0.5,
+    "dissipation": 0.1,
+    "friction": 0.1,
+    "rail_arcs": [(5.0, 2.0)],
+}
 
 
 @lru_cache(maxsize=1)
@@ -99,6 +107,7 @@ def everything():
             force="0.1*length*rate",
         )
     )
+    m.add(fb.WheelOnRail("wheel", "ground", "e", at=(2, 0.4, -1.2), axis=(0, 1, 0), radius=0.4, conicity=0.05, **SOFT))
     m.add(fb.TorsionalSpringDamper("torsion", joint="C", stiffness=3.0, damping=0.1, angle=0.2, torque="0.1*angle**3"))
     return m
 

@@ -249,6 +249,7 @@ PLANAR = {
     "Driver of a table unknown": ({"coordinate": "A.angle", "law": "lift(t)"}, "unknown function 'lift'"),
     "Driver of a force": ({"coordinate": "spring.length", "law": "t"}, "'spring' is a SpringDamper, no joint"),
 }
+WHEEL = {**AT3, "axis": (0, 1, 0), "radius": 0.46, "conicity": 0.05}
 SPATIAL = {
     "GearPair without a carrier": (
         {"joint_1": "A", "joint_2": "D"},
@@ -290,6 +291,26 @@ SPATIAL = {
     "Bushing angle": ({**AT3, "angle": 1}, "in a spatial mechanism give orientation=, not angle="),
     "Bushing nowhere": ({"body_i": "ground", "body_j": "a"}, "give its position: at="),
     "JointFriction of a ball": ({"joint": "ball", "radius": 0.1}, "Spherical 'ball' has no coordinate 'angle'"),
+    "WheelOnRail bare": ({**WHEEL, "conicity": None}, "the wheel has no profile; give conicity= or wheel_profile="),
+    "WheelOnRail twice": ({**WHEEL, "wheel_profile": SQUARE}, "both conicity and wheel_profile are given"),
+    "WheelOnRail crossing": (
+        {**WHEEL, "conicity": None, "wheel_profile": [(0, 0), (0.01, 0), (0.03, 0.01), (0.02, 0.02)]},
+        r"wheel_profile: y = 0.02 m of point 3 comes after 0.03 m; y must ascend: .* turns back or crosses itself",
+    ),
+    "WheelOnRail short": ({**WHEEL, "rail_profile": [(0, 0), (0.01, 0), (0.02, 0)]}, "has 3 points; give four or more"),
+    "WheelOnRail pairs": ({**WHEEL, "rail_profile": [(0, 0, 0)]}, r"give pairs of numbers, such as \(y, z\)"),
+    "WheelOnRail arcs": ({**WHEEL, "rail_arcs": [(0.3, 0.01), (0.08, 0.005)]}, "arc 1 has the radius .* ends ascend"),
+    "WheelOnRail vertical": ({**WHEEL, "rail_arcs": [(0.01, 0.02)]}, "is vertical before it ends at y = 0.02 m"),
+    "WheelOnRail askew": ({**WHEEL, "direction": (0, 1, 1)}, "is not perpendicular to axis"),
+    "WheelOnRail smooth": ({**WHEEL, "friction": 0}, "friction is 0; give a small one"),
+    "WheelOnRail Poisson": ({**WHEEL, "poissons_ratio": 0.6}, "poissons_ratio is 0.6; it is from 0 to 0.5"),
+    "WheelOnRail curve": ({**WHEEL, "curve_radius": 300, "roller_radius": 1}, "curve_radius is that of a track"),
+    "WheelOnRail rough roller": (
+        {**WHEEL, "vertical": "t", "roller_radius": 1},
+        "functions of the distance along a track",
+    ),
+    "WheelOnRail radius": ({**WHEEL, "radius": 0}, "radius is 0 m; it must be greater than 0"),
+    "WheelOnRail nowhere": ({**WHEEL, "at": None}, "give at=, the place on top of the rail|give its position: at="),
     "PointForce of two": ({"body": "a", "force": (1, 2)}, "needs 3 components, such as"),
     "PointTorque of one": ({"body": "a", "torque": 1}, "needs 3 components, such as"),
     "Sensor of a freedom": ({"of": "P.angle"}, "'P.angle' is no curve; Prismatic 'P' has P.displacement, P.rate"),

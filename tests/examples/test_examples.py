@@ -40,6 +40,7 @@ PROMISED = {
     "andrews.toml",
     "bennett.py",
     "bogie.py",
+    "bogie_on_rollers.py",
     "bricard.toml",
     "bouncing_ball.toml",
     "cam.py",

@@ -327,22 +327,35 @@ def generated_formula(home: str, name: str, arguments: str, lines: Sequence[str]
 
 
 def dispatch_by_kind(
-    home: str, name: str, arguments: str, cases: Mapping[int, Callable], otherwise: str, form: int | None = None
+    home: str,
+    name: str,
+    arguments: str,
+    cases: Mapping[int, Callable],
+    otherwise: str,
+    form: int | None = None,
+    more: str = "",
 ) -> Any:
     """Formula ``name(kind, arguments)`` that calls the formula of that kind.
 
     ``otherwise`` is the result for an unknown kind: nan, so that the formula of another element is never used. With a
-    ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called.
+    ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called. ``more`` names a
+    last argument that only formulas with one argument more are given.
     """
     if unmarked := [f"{f.__module__}.{f.__name__}" for f in cases.values() if f not in _marked]:
         raise RuntimeError(f"compiled code cannot call {', '.join(unmarked)}: put the decorator @formula above it")
     names: dict[str, Any] = {f"{_formula_name(f)}_{kind}": f for kind, f in sorted(cases.items())}
     lines = []
     for called, kind in zip(names, sorted(cases), strict=True):
-        lines += [f"if kind == {kind}:", f"    return {called}({arguments})"]
+        given = f"{arguments}, {more}" if _takes(cases[kind], arguments, more) else arguments
+        lines += [f"if kind == {kind}:", f"    return {called}({given})"]
     last = otherwise if form is None else f"formula_at(kind, {form}, ({arguments},), {otherwise})"
     names |= {"nan": math.nan, "formula_at": formula_at}
-    return generated_formula(home, name, f"kind, {arguments}", [*lines, f"return {last}"], names)
+    every = f"kind, {arguments}, {more}" if more else f"kind, {arguments}"
+    return generated_formula(home, name, every, [*lines, f"return {last}"], names)
+
+
+def _takes(f: Callable, arguments: str, more: str) -> bool:
+    return bool(more) and f.__code__.co_argcount > len(arguments.split(","))
 
 
 def _formula_name(f: Callable) -> str:

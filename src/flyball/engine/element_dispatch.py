@@ -90,8 +90,10 @@ INPUT, WRENCH, EFFORT, BRANCH = range(len(SIGNATURES))
 inputs = dispatch_by_kind(__name__, "inputs", SIGNATURES[INPUT].arguments, INPUTS, f"({NAN}, {NAN})", INPUT)
 """Inputs of the laws of a force between frames."""
 
-wrench = dispatch_by_kind(__name__, "wrench", SIGNATURES[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH)
-"""Wrench of a force between frames on M."""
+wrench = dispatch_by_kind(
+    __name__, "wrench", SIGNATURES[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH, "data"
+)
+"""Wrench of a force between frames on M; ``data`` has the splines of those that are given by curves."""
 
 branch = dispatch_by_kind(
     __name__, "branch", SIGNATURES[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH

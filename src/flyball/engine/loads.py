@@ -263,9 +263,8 @@ def wrench_between_frames(S, W, t, k):
     par = force_row(S.force_parameters, k)
     a, b = inputs(kind, par, F, M)
     x = (t + 0.0 * a, a, b)
-    force, torque = wrench(
-        kind, par, F, M, (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x)), (a, b)
-    )
+    laws = (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x))
+    force, torque = wrench(kind, par, F, M, laws, (a, b), S.const)
     return F, M, force, torque
 
 

@@ -191,9 +191,8 @@ def wrench_slopes(S, W, t, k, out):
             M = (p, tilted_rotation(R, scale(moved, axis)), add(w, scale(moving, axis)), v, alpha, a)
         q, r = inputs(kind, par, F, M)
         x = (t, q, r)
-        force, torque = wrench(
-            kind, par, F, M, (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x)), (q, r)
-        )
+        laws = (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x))
+        force, torque = wrench(kind, par, F, M, laws, (q, r), S.const)
         s = dot(force, axis) if i < 3 else dot(torque, axis)
         out[k, STIFFNESS + i] -= s * moved / (2.0 * d * d)
         out[k, DAMPING + i] -= s * moving / (2.0 * e * e)

@@ -93,3 +93,4 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .shear_pin import ShearPin as ShearPin
     from .spring_damper import SpringDamper as SpringDamper
     from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper
+    from .wheel_on_rail import WheelOnRail as WheelOnRail

@@ -206,6 +206,11 @@ def positive(x):
     return x.granted("positive") if hasattr(x, "granted") else x.real > 0.0
 
 
+def nonpositive(x):
+    """Whether a number is zero or less, for a shorter way to the same result; False for arrays and expressions."""
+    return isinstance(x, _NUMBERS) and x.real <= 0.0
+
+
 def divide(a, b):
     """A / b; inf or nan where b is zero, as in C."""
     if isinstance(b, _NUMBERS):
@@ -377,6 +382,10 @@ def _register_choices() -> None:
     @overload(positive)
     def choose_positive(x):
         return lambda x: x.real > 0.0
+
+    @overload(nonpositive)
+    def choose_nonpositive(x):
+        return lambda x: x.real <= 0.0
 
     @overload(choose)
     def choose_choose(x, a, b):

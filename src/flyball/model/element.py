@@ -271,6 +271,7 @@ class Element(metaclass=ElementType):
     shows_parts: ClassVar[bool] = True  # whether pictures show the elements that belong to it
     registry: ClassVar[dict[str, type[Element]]] = {}
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
+    in_own_axes: ClassVar[tuple[str, ...]] = ()  # points that its other fields place, and that copies keep
     local: ClassVar[tuple[str, ...]] = ()  # vectors and orientations along its own or its body's axes, not the world's
     mirrors: ClassVar[bool] = False  # of an own element: whether its formulas hold for it turned or reflected as well
 

@@ -49,6 +49,8 @@ class Force(Element):
     reversing: ClassVar[
         dict[str, str]
     ] = {}  # field that names a coordinate -> field that changes sign with its direction
+    figures: ClassVar[Callable | None] = None  # values of ``outputs`` of a force between frames
+    takes_splines: ClassVar[bool] = False  # whether its wrench has the last argument ``data``; see `curves`
     fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 
     def ends(self) -> dict[str, str]:
@@ -61,6 +63,14 @@ class Force(Element):
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return up to sixteen parameters of the formulas."""
+        return ()
+
+    def wrench_between(self, par: Any, F: Any, M: Any, laws: Any, values: Any, data: Any) -> Any:
+        """Return the wrench of a force between frames; ``data`` is given to formulas that take it."""
+        return self.wrench(par, F, M, laws, values, *((data,) if self.takes_splines else ()))
+
+    def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
+        """Return splines that its wrench has as a last argument, ``data``; the first parameter is then their place."""
         return ()
 
     def laws(self) -> tuple[Law | None, ...]:

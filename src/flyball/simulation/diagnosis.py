@@ -469,7 +469,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
             out = (
                 e.effort(par, x, y, laws, pressed)
                 if isinstance(e, CoordinateForce)
-                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+                else np.ravel(e.wrench_between(par, F, M, tuple(laws), (x, y), S.const))
             )
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"

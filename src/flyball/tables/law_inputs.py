@@ -212,7 +212,9 @@ class NonsmoothPoints:
             return None
         s = self.s
         slots = {name: s.slots[name] for name in law.names if name in s.slots}
-        if inputs and self.key(e) in s.measured:
+        if inputs:
+            if self.key(e) not in s.measured:  # inputs that only the force's own formula computes
+                return None
             m = s.measured[self.key(e)]
             slots |= {inputs[0]: m, inputs[1]: len(s.measured) + m}
 

@@ -23,6 +23,7 @@ from ..math.scalar import real_parts, sqrt
 from ..math.vec import inner_product
 from ..model.body import GROUND
 from ..model.expressions import Expression, number
+from ..model.force import Force
 from ..model.joint import Coupling, Joint
 from ..model.model import Model
 from ..model.snapshot import ResultCache, exact_key
@@ -176,7 +177,7 @@ def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Value
     )  # fmt: skip
     if any(a.tobytes() != b.tobytes() for a, b in same):
         return None
-    forces = _force_parameters(s, pose, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
+    forces = _force_parameters(s, pose, curve_at, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
     of_switches = refresh.table("switch_numbers", S.switch_numbers, dtype)
     constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.frame_separation)
     S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
@@ -198,7 +199,7 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
     terms = refresh.table("term_parameters", np.zeros((len(s.terms), 8), dtype), dtype)
     terms = _term_parameters(s, pose, holds, curve_at, terms, refresh)
     forces = _force_parameters(
-        s, pose, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
+        s, pose, curve_at, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
     )
     if refresh.base is None and s.points and s.code_tables and dtype is float:
         check_point_formulas(s, pose, forces, terms, float(length))
@@ -356,11 +357,12 @@ def _longest_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
-    """Parameters, literals and tables of the laws, splines of joints; and where those of each joint begin."""
+    """Parameters, literals and tables of the laws, splines of joints and forces; and where those of each begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
     curve_at = {}
-    for e in s.model.joints:
+    elements: tuple[Joint | Force, ...] = (*s.model.joints, *s.forces)
+    for e in elements:
         if curves := e.curves(numbers[e.name]):
             curve_at[e.name] = len(const)
             for data in curves:
@@ -423,11 +425,15 @@ def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> 
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, refresh: Refresh) -> np.ndarray:
+def _force_parameters(
+    s: Structure, pose: Poses, curve_at: Mapping[str, int], x: np.ndarray, refresh: Refresh
+) -> np.ndarray:
     for k in refresh.rows(s, "forces"):
         e = s.forces[k]
         par = e.parameters(pose.numbers[e.name], pose.frame_separation(e))
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")
         x[k], x[k, : len(par)] = 0.0, par
+        if e.name in curve_at:
+            x[k, 0] = curve_at[e.name]
     return x

@@ -35,8 +35,17 @@ class ForceView(PartView):
         F, M, par = self._frames
         a, b = (np.broadcast_to(i, (self._result.motions.n,)) for i in e.inputs(par, F, M))
         laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
-        force, torque = e.wrench(par, F, M, laws, (a, b))
+        force, torque = e.wrench_between(par, F, M, laws, (a, b), S.const)
         return (a, b), force, torque
+
+    @cached_property
+    def _figures(self) -> tuple:
+        """Return all outputs of a force between frames that computes them by a formula."""
+        F, M, par = self._frames
+        S, k = self._x.system, self._index()
+        a, b = self.element.inputs(par, F, M)
+        laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
+        return tuple(self.element.figures(par, F, M, laws, S.const))
 
     @property
     def _frames(self) -> tuple[tuple, tuple, Any]:
@@ -243,6 +252,8 @@ class ForceView(PartView):
                 return np.abs(value) if name == "taut" else value
             seen = self.element.outward(self._x.numbers[self.element.name])
             return (self.element.sign if k == 2 else 1.0) * seen * value
+        if self.element.figures is not None:
+            return np.broadcast_to(self._figures[k], (self._result.motions.n,))
         inputs, force, _ = self._between()
         if k < 2:
             return inputs[k]
