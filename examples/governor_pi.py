@@ -63,7 +63,7 @@ def main(out: Path) -> None:
         print(f"{name}: {rate[0]:.4f} rad/s before, {rate.min():.4f} at least, {rate[-1]:.4f} in the end")
         run.plot("shaft.angle_rate", path=out / f"{name}.png")
     print(f"droop by the formula: {speed(-P['more'] / P['kp']):.4f} rad/s")
-    run.view(out / "governor_pi.html")
+    run.to_html(out / "governor_pi.html")
 
 
 if __name__ == "__main__":

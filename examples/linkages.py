@@ -1,4 +1,4 @@
-"""Planar linkages from a table of points and bars: Jansen's leg, six-bars of Watt and Stephenson, Hoeken's line.
+"""Planar linkages from a table: legs of Jansen and Klann, six-bars, Hoeken's line, a pantograph, Schmidt's coupling.
 
 A point is given, or lies at two distances from two points (a dyad): ``("W", "X", 50, "Y", 41.5, +1)`` lies 50 from X
 and 41.5 from Y, on the left (+1) or right (-1) side of the line from X to Y. Bars are rigid through all their points; a
@@ -9,7 +9,7 @@ Run one with ``python examples/linkages.py jansen out``: it prints its freedoms,
 
 import sys
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, cycle
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +64,37 @@ LINKAGES = {
         {"crank": ("A", "B"), "coupler": ("B", "C", "P"), "rocker": ("D", "C")},
         ("A", "D"), trace="P",
     ),
+    # Klann's leg (US patent 6260862, 1998), measured in a figure: crank, two rockers, connecting rod and leg.
+    "klann": Linkage(
+        {"A": (41.4, 26.64), "B": (27.69, 19.71), "D": (27.69, 31.09), "C": (36.04, 25.41)},
+        [("E", "C", 14.91, "B", 6.63, -1), ("K", "C", 25.4, "E", 10.62, -1), ("H", "D", 8.46, "K", 13.94, -1),
+         ("S", "K", 24.47, "H", 38.23, -1)],
+        {"crank": ("A", "C"), "connecting rod": ("C", "E", "K"), "lower rocker": ("B", "E"), "upper rocker": ("D", "H"),
+         "leg": ("H", "K", "S")},
+        ("A", "B", "D"), trace="S",
+    ),
+    # Scheiner's pantograph (1603), led round a circle by a crank: Q draws what P draws, three times as large, from O.
+    "pantograph": Linkage(
+        {"Z": (15, 20), "P": (19, 20), "O": (0, 0)},
+        [("A", "O", 20, "P", 36, 1), ("B", "O", 60, "A", 40, 1), ("D", "P", 40, "B", 36, -1),
+         ("Q", "B", 108, "D", 72, 1)],
+        {"crank": ("Z", "P"), "arm": ("O", "A", "B"), "forearm": ("B", "D", "Q"), "upper rod": ("P", "D"),
+         "lower rod": ("A", "P")},
+        ("Z", "O"), trace="Q",
+    ),
+    # Schmidt's coupling (US patent 3242694, 1966): shafts whose distance may change; the middle disk has no bearing.
+    "schmidt": Linkage(
+        {"A": (0, 0), "C": (30, 0)}
+        | {f"a{k}": (24 * np.cos(np.pi * k / 1.5), 24 * np.sin(np.pi * k / 1.5)) for k in range(3)}
+        | {f"b{k}": (15 + 24 * np.cos(np.pi * k / 1.5), 20 + 24 * np.sin(np.pi * k / 1.5)) for k in range(3)}
+        | {f"c{k}": (30 + 24 * np.cos(np.pi * k / 1.5), 24 * np.sin(np.pi * k / 1.5)) for k in range(3)},
+        [],
+        {"driving disk": ("A", "a0", "a1", "a2"), "middle disk": ("b0", "b1", "b2")}
+        | {"driven disk": ("C", "c0", "c1", "c2")}
+        | {f"link {k}": (f"a{k}", f"b{k}") for k in range(3)}
+        | {f"rod {k}": (f"b{k}", f"c{k}") for k in range(3)},
+        ("A", "C"), trace="c0",
+    ),
 }  # fmt: skip
 
 
@@ -74,7 +105,8 @@ def points_of(linkage: Linkage) -> dict[str, np.ndarray]:
         d = at[b] - at[a]
         length = np.hypot(*d)
         along = (length**2 + r**2 - s**2) / (2 * length)
-        across = np.sqrt(max(r**2 - along**2, 0.0))  # 0 where the two circles touch
+        square = r**2 - along**2
+        across = np.sqrt(square) if square > 1e-12 * r**2 else 0.0  # 0 where the two circles touch
         at[name] = at[a] + (along * d + side * across * np.array([-d[1], d[0]])) / length
     return {name: linkage.unit * p for name, p in at.items()}
 
@@ -86,7 +118,7 @@ def mechanism(name: str = "jansen", speed: str = "30 rpm") -> fb.Mechanism:
     width = 2 * linkage.unit
     m = fb.Mechanism(f"linkage of {name.capitalize()}", planar=True, gravity=(0, -9.81), parameters={"speed": speed})
     ends: dict[str, list[str]] = {p: ["ground"] for p in linkage.ground}
-    for color, (bar, points) in zip(COLORS, linkage.bars.items(), strict=False):
+    for color, (bar, points) in zip(cycle(COLORS), linkage.bars.items(), strict=False):
         middle = np.mean([at[p] for p in points], axis=0)
         sides = [
             fb.Link(start=tuple(at[p] - middle), end=tuple(at[q] - middle), width=width, thickness=width / 2)

@@ -17,7 +17,9 @@ CONTACT = {  # see test_contact_examples
     "newtons_cradle.py",
     "pile_in_a_box.py",
     "rocking_block.toml",  # and test_events
+    "silo.py",  # and verification/test_silo
     "tippe_top.py",
+    "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
 ROBOTS = {"delta_robot.py", "five_bar.py", "hexapod_postures.py", "quadruped.py", "robot_arm_circle.py"}  # test_robots

@@ -35,13 +35,17 @@ def parts(found):
 
 
 def test_the_criterion_is_one_inequality(governor):
-    """b W l sin^2 (J + 2 I + 2 m l^2 sin^2 + 8 m l^2 cos^2) > 2 k cos (I + m l^2 + 2 sleeve l^2 sin^2): derived by hand."""
+    """b W l sin^2 (J + 2 I + 2 m l^2 sin^2 + 8 m l^2 cos^2) > 2 k cos (I + m l^2 + 2 M l^2 sin^2): derived by hand.
+
+    M is the mass of the sleeve and, by the lever, of the valve.
+    """
     greater, smaller, x = parts(governor[1])
     m, I, sleeve, l, alpha, J, k, b, W = (x[n] for n in NAMES)
     s, c = sympy.sin(alpha), sympy.cos(alpha)
     wanted = b * W * l * s**2 * (J + 2 * I + 2 * m * l**2 * s**2 + 8 * m * l**2 * c**2)
-    wanted -= 2 * k * c * (I + m * l**2 + 2 * sleeve * l**2 * s**2)
-    ratio = sympy.simplify((greater - smaller) / wanted)
+    lifted = sleeve + x["valve"] / x["lever"] ** 2
+    wanted -= 2 * k * c * (I + m * l**2 + 2 * lifted * l**2 * s**2)
+    ratio = sympy.simplify((greater - smaller) / wanted / x["lever"] ** 2)
     assert ratio.is_number
     assert ratio > 0
     assert governor[1].zeros == 1  # the angle of the shaft
@@ -56,13 +60,13 @@ def test_the_classical_criterion_is_its_limit(governor):
     greater, smaller, x = parts(governor[1])
     m, l, alpha, J, k, b, W = (x[n] for n in NAMES if n not in ("I", "sleeve"))
     heavy = sympy.Symbol("heavy", positive=True)
-    point = (greater - smaller).subs({x["I"]: 0, x["sleeve"]: 0})
+    point = (greater - smaller).subs({x["I"]: 0, x["sleeve"]: 0, x["valve"]: 0})
     classical = sympy.limit(sympy.expand(point.subs({J: heavy * J, k: heavy * k})) / heavy, heavy, sympy.oo)
     own_m, own_b, F = 2 * m * l**2, 4 * b * l**2 * sympy.sin(alpha) ** 2, 2 * k * l * sympy.cos(alpha)
-    ratio = sympy.simplify(classical / (own_b * J / own_m - 2 * F / W))
+    ratio = sympy.simplify(classical / (own_b * J / own_m - 2 * F / W) / x["lever"] ** 2)
     assert sympy.simplify(ratio / (W * m * l)).is_number
     assert (ratio / (W * m * l)).subs({x: 1 for x in ratio.free_symbols}) > 0
-    assert not {x["I"], x["sleeve"]} & classical.free_symbols
+    assert not {x["I"], x["sleeve"], x["valve"]} & classical.free_symbols
 
 
 @settings(max_examples=25, deadline=None)
@@ -90,7 +94,7 @@ def test_at_the_limit_the_numeric_mechanism_swings_for_ever(governor):
     """On the boundary the compiled mechanism's linearisation has a pair on the imaginary axis."""
     L, found = governor
     greater, smaller, x = parts(found)
-    own = {x[n]: sympy.Float(v, 20) for n, v in L.parameters.items() if n != "b"}
+    own = {x[n]: sympy.Float(v, 20) for n, v in L.parameters.items() if n in x and n != "b"}
     b = float(sympy.solve((greater - smaller).subs(own), x["b"])[0])
     N = watt(b=b, **L.balance(b=b)).linearize(coordinates="joint")
     w = N.eigenvalues[N.eigenvalues.imag > 1e-3]

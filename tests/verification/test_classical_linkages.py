@@ -1,4 +1,4 @@
-"""Linkages of the examples in closed form: Jansen's leg, six-bars, Hoeken's line, Oldham's coupling, Bennett's linkage."""
+"""Linkages of the examples in closed form: legs, six-bars, Hoeken's line, pantograph, couplings, Bennett's linkage."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def third(a: np.ndarray, b: np.ndarray, r: float, s: float, side: int) -> np.nda
     return a + r * d / abs(d) * np.exp(1j * side * turn)
 
 
-@pytest.mark.parametrize("name", ["jansen", "watt", "stephenson"])
+@pytest.mark.parametrize("name", ["jansen", "klann", "watt", "stephenson"])
 def test_points_of_a_linkage_of_dyads(name):
     """Every point, over a whole turn, one dyad after the other."""
     linkage, m = LINKAGES["LINKAGES"][name], LINKAGES["mechanism"](name)
@@ -44,6 +44,35 @@ def test_the_foot_of_jansens_leg_stays_on_the_ground_for_more_than_a_third_of_a_
     stands = y < y.min() + 0.01 * np.ptp(x)
     assert 0.35 < stands.mean() < 0.45
     assert np.ptp(x[stands]) > 0.65 * np.ptp(x)
+
+
+def test_the_foot_of_klanns_leg_stays_near_the_ground_for_half_a_turn():
+    """Half a turn in contact, the other half lifted: two legs at opposite cranks walk (US patent 6260862)."""
+    run = LINKAGES["mechanism"]("klann").kinematics(np.linspace(0, 2, 721))
+    x, y = run["leg S"].position.T
+    stands = y < y.min() + 0.15 * np.ptp(y)
+    assert 0.45 < stands.mean() < 0.65
+    assert np.ptp(x[stands]) > 0.95 * np.ptp(x)
+
+
+def test_the_pantograph_enlarges_three_times():
+    run = LINKAGES["mechanism"]("pantograph").kinematics(np.linspace(0, 2, 73))
+    p, q = run["crank P"].position, run["forearm Q"].position
+    np.testing.assert_allclose(p @ [1, 1j], 0.15 + 0.2j + 0.04 * np.exp(1j * np.pi * run.t), atol=1e-12)
+    np.testing.assert_allclose(q, 3 * p, atol=1e-12)
+
+
+def test_schmidts_coupling_keeps_the_speed_and_its_middle_disk_turns_about_a_fixed_point():
+    """Two rows of each three links are redundant; the middle disk's centre is at a link's length from both shafts."""
+    m = LINKAGES["mechanism"]("schmidt")
+    report = m.mobility()
+    assert (report.freedoms, report.redundancy) == (0, 2)
+    run = m.kinematics(np.linspace(0, 2, 73))
+    np.testing.assert_allclose(run["C.angle"], run["A.angle"], atol=1e-12)
+    np.testing.assert_allclose(run["middle disk"].position, np.tile([0.15, 0.2], (73, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        run["link 0"].position @ [1, 1j], 0.075 + 0.1j + 0.24 * np.exp(1j * np.pi * run.t), atol=1e-12
+    )
 
 
 def test_hoekens_line_is_straight_to_a_quarter_percent_over_half_a_turn():
