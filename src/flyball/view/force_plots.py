@@ -91,8 +91,8 @@ def plot_convergence(histories: Sequence[Convergence], path: str | os.PathLike |
                 for n, step in enumerate(h):
                     values = getattr(step, what)
                     values = values if what == "energy" else np.where(values > 0.0, values, np.nan)
-                    label = h.solver if n == 0 else None
-                    ax.plot(step.iteration, values, label=label, color=PALETTE[k % len(PALETTE)], lw=1.0)
+                    look = {"color": PALETTE[k % len(PALETTE)], "linestyle": ("-", "--", ":")[k % 3], "lw": 1.2}
+                    ax.plot(step.iteration, values, label=h.solver if n == 0 else None, **look)
             if what != "energy":
                 ax.set_yscale("log")
             ax.set_ylabel(f"{'residual' if what == 'velocity' else what} [{histories[0].units[what]}]")
