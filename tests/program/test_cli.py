@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.cli import COMMANDS, app
+from flyball.numerics.complementarity.solver_choice import solver_names
 from tests.results.made_up import mechanism, slider_crank
 
 
@@ -113,6 +114,52 @@ def test_a_run_that_cannot_go_on_keeps_what_was_computed(here: Path) -> None:
     assert data["kind"] == "SimulationError"
     assert not data["success"]
     assert len(data["files"]) == 2
+
+
+CONTACT = """
+gravity = [0, 0, -9.81]
+[[ground]]
+name = "floor"
+shape = { type = "Plane" }
+[[bodies]]
+name = "box"
+density = 500
+shape = { type = "Box", edges = [0.2, 0.2, 0.1] }
+position = [0, 0, 0.06]
+[[contacts]]
+friction = 0.3
+"""
+
+
+@pytest.mark.parametrize("solver", solver_names())
+def test_every_contact_solver_can_be_asked_for(here: Path, solver: str) -> None:
+    (here / "box.toml").write_text(f'name = "box"{CONTACT}')
+    convex = ["--no-coulomb"] if solver == "barzilai-borwein" else []
+    words = ["--method", "impulse", "--step", "5 ms", "--solver", solver, *convex, "--history", "0.05,0.1"]
+    said = Said("run", "box.toml", "--t-end", "0.1", "--no-animation", "--no-plots", "--json", *words)
+    assert said.code == 0, said.err
+    assert json.loads(said.out)["health"]["options"]["method"]["solver"] == solver
+    assert (here / "box-result" / "residuals.png").stat().st_size > 1000
+    assert solver in "".join(Said("run", "--help").out.split())
+
+
+LIST = "unknown solver 'lemke' of Stepping; choose one of auto, gauss-seidel, newton, jacobi, barzilai-borwein, apgd,"
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["--method", "impulse", "--solver", "lemke"], LIST),
+        (["--solver", "apgd"], "--solver is an option of impulse time stepping: give --method impulse with it"),
+        (["--method", "impulse", "--directions", "4"], "directions of Stepping is for solver='pyramid'"),
+        (["--method", "impulse", "--history", "some"], "history of Stepping is 'some'"),
+    ],
+)
+def test_wrong_options_of_contact_end_with_2(here: Path, words: list[str], part: str) -> None:
+    (here / "box.toml").write_text(f'name = "box"{CONTACT}')
+    said = Said("run", "box.toml", *words)
+    assert said.code == 2
+    assert part in " ".join(said.err.split())
 
 
 def test_an_interrupted_run_is_written(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ STANDS_ALONE = {  # these import no more than this of what is below them
 LATER = {  # imports inside functions of what stands above: methods that lead from a thing to what is done with it
     "__init__": {"model"},
     "assembly": {"mobility"},
-    "cli": {"compiler", "live", "mechanism", "model", "view"},
+    "cli": {"compiler", "live", "mechanism", "model", "simulation", "view"},
     "controllers": {"expression_graph"},
     "derivatives": {"simulation"},
     "mechanism": {"results", "robots", "view"},

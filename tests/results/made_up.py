@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 
 import flyball as fb
-from flyball.results.contacts import ContactBodies, Contacts, Convergence
+from flyball.results.contacts import ContactBodies, Contacts
+from flyball.results.convergence import Convergence
 from flyball.results.health import ContactHealth, Health
 from flyball.results.part_views.bodies import BodySetMotion
 from flyball.results.result import Result
@@ -95,7 +96,7 @@ def thrown(n: int = 5, planar: bool = False) -> Result:
     r.contacts = Contacts(
         t, ContactBodies(("block", "balls", "ground"), (-1, 3, -1)), 2 * np.arange(n + 1), np.tile([(4, 0), (4, 2)], (n, 1)),
         np.tile(start[:2], (n, 1)), np.tile(up, (k, 1)), np.linspace(0, -1e-4, k), force, np.tile([0, 1], n),
-        np.full(k, 0.3), Convergence(t, 0.1 * t, 0.01 * t, np.arange(n), solver="Gauss-Seidel"), planar,
+        np.full(k, 0.3), Convergence(t, np.arange(n + 1), *np.ones((6, n)), solver="Gauss-Seidel"), planar,
     )  # fmt: skip
     r.exchanged = {"friction_loss": t**2, "impact_loss": 0 * t}
     r.health.contact = ContactHealth(

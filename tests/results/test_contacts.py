@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts, Convergence
+from flyball.results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
+from flyball.results.convergence import Convergence
 
 SIDES = ContactBodies(("box", "balls", "ground"), (-1, 3, -1))  # 0; 1, 2, 3; 4
 G = 9.81
@@ -143,10 +144,10 @@ def test_pictures_of_forces_and_residuals(tmp_path):
     c.plot(path=tmp_path / "all.png")
     assert (tmp_path / "all.png").stat().st_size > 1000
     k = np.arange(1, 20)
-    h = Convergence(k, 1.0 / k**2, 1.0 / k**3, k, over="iteration", solver="APGD")
+    h = Convergence(np.array([0.1]), np.array([0, 19]), k, 1.0 / k**2, *[1.0 / k] * 3, -1.0 * k, solver="APGD")
     np.testing.assert_allclose(h.plot().axes[0].lines[0].get_ydata(), 1.0 / k**2)
     with pytest.raises(ValueError, match="convergence"):
-        Convergence(k, k[1:], k, k)
+        Convergence(np.array([0.1]), np.array([0, 18]), *[k] * 6)
 
 
 def tumbling(seed: int) -> fb.Mechanism:

@@ -69,6 +69,13 @@ def read_count_or_values(text: str, unit: str, flag: str) -> int | list[float]:
     return read_values(text, unit, flag)
 
 
+def read_steps(text: str, unit: str, flag: str) -> str | int | tuple[float, ...]:
+    """Parse a choice of steps: ``all``, a number n for every n-th, or a range of time, as ``0.5,0.6``."""
+    if text.isdecimal():
+        return int(text)
+    return text if text.isalpha() else tuple(read_quantity(x, unit, flag) for x in text.split(","))
+
+
 def read_result_file(path: Path, unit: str, flag: str) -> Any:
     """Load the result in a file."""
     from ..mechanism import load_result

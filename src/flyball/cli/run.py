@@ -22,13 +22,34 @@ from .application import (
     print_table,
     with_option_names,
 )
-from .options import OptionOverride, read_assignments, read_values, refuse_duplicate
+from .options import OptionOverride, read_assignments, read_steps, read_values, refuse_duplicate
 from .subcommand import Request, command
 
 if TYPE_CHECKING:
     from ..results.result import Result
 
 
+STEPPING = "Impulse time stepping (--method impulse): "
+Solver = Annotated[
+    str | None,
+    typer.Option(
+        help=f"{STEPPING}solver of the cone problem: auto, gauss-seidel, newton, jacobi, barzilai-borwein, apgd, "
+        "apgd-lean, admm, pyramid. [auto if not given]"
+    ),
+]
+Iterations = Annotated[int | None, typer.Option(help=f"{STEPPING}largest number of iterations of a velocity solve.")]
+Tolerance = Annotated[float | None, typer.Option(help=f"{STEPPING}residual [m/s] at which iterations stop.")]
+Directions = Annotated[int | None, typer.Option(help=f"{STEPPING}edges of the pyramid of --solver pyramid. [8]")]
+Coulomb = Annotated[
+    bool | None, typer.Option(help=f"{STEPPING}Coulomb's law, or its convex approximation. [Coulomb's law]")
+]
+HistorySteps = Annotated[
+    str | None,
+    typer.Option(
+        help=f"{STEPPING}steps whose residuals over the iterations are kept, and drawn in residuals.png: all, 10 "
+        "(every tenth step), or 0.5,0.6 (range of time)."
+    ),
+]
 MAX_CSV_NUMBERS = 5_000_000  # above this size the table is not written: such a file is of no use
 
 
@@ -57,8 +78,19 @@ def run(
         bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    solver: Solver = None,
+    iterations: Iterations = None,
+    tolerance: Tolerance = None,
+    directions: Directions = None,
+    coulomb: Coulomb = None,
+    history: HistorySteps = None,
 ) -> None:
     """Write report.html, animation.html, result.csv and result.nc; pictures into plots/ on request."""
+    steps = None if history is None else read_steps(history, "s", "--history")
+    choose_stepping(
+        request, solver=solver, iterations=iterations, tolerance=tolerance, directions=directions, coulomb=coulomb,
+        history=steps,
+    )  # fmt: skip
     talk, error = not (request.as_json or quiet), None
     try:
         result = request.run_analysis(progress=talk)
@@ -76,12 +108,36 @@ def run(
     for path in save or ():
         result.save(path)
         files.append(path)
+    if steps is not None and result.contacts is not None and result.contacts.history:
+        result.contacts.history.plot(folder / "residuals.png")
+        files.append(folder / "residuals.png")
     if spectrum and len(result.t):
         found = result.spectrum(*spectrum)
         found.plot(folder / "spectrum.png")
         files.append(folder / "spectrum.png")
         notes += [f"spectrum of {label}: {text}" for label, text in found.lines() if label in found.names]
     _print_summary(result, error, files, notes, request.as_json, talk)
+
+
+def choose_stepping(request: Request, **options: object) -> None:
+    """Make the method impulse time stepping with the options that were given, and the step.
+
+    Raises
+    ------
+    ModelError
+        If they are given with another method, or one of them is wrong.
+    """
+    from ..simulation.integration_options import Stepping
+
+    options = {k: x for k, x in options.items() if x is not None}
+    given = request.given
+    if given.get("method") == "impulse":
+        step = {"step": given.pop("step")} if "step" in given else {}
+        given["method"] = Stepping(**step, **options)  # type: ignore[arg-type]
+    elif options:
+        raise ModelError(
+            f"--{next(iter(options))} is an option of impulse time stepping: give --method impulse with it"
+        )
 
 
 def _print_summary(

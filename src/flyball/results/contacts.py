@@ -1,4 +1,4 @@
-"""Contacts of a motion: contact points at each output time, their forces, and convergence of the solves.
+"""Contacts of a motion: contact points at each output time, and their forces.
 
 `Contacts` is a table with one row per contact and output time; `PairForce` sums the rows of a pair of bodies or sets.
 For an event-driven motion the table is computed from its constraint rows (`ContactHistory`), at closed contact points.
@@ -23,63 +23,13 @@ from ..model.body import GROUND
 from ..model.contact_point import Touch
 from ..model.messages import listing, suggest
 from ..model.quantities import MEMBER
+from .convergence import Convergence, concatenate_histories
 from .motion_record import term_over_time
 
 if TYPE_CHECKING:
     import pandas
 
     from .result import Result
-
-
-@dataclass(frozen=True, eq=False)
-class Convergence:
-    """Residuals of solves, one row each.
-
-    Attributes
-    ----------
-    x : ndarray (n,)
-        Time at the end of the step [s], or number of the iteration.
-    velocity : ndarray (n,) [m/s]
-        Residual of velocities that should vanish.
-    force : ndarray (n,)
-        Residual of impulses, relative to the largest one.
-    iterations : ndarray (n,) of int
-        Iterations of each solve; of one solve's own history those up to the row.
-    over : str
-        What ``x`` is: ``"time"`` or ``"iteration"``.
-    solver : str
-        The solver.
-    objective : ndarray (n,) or None
-        1/2 p' N p + b' p [J], of one solve's own history.
-    """
-
-    x: np.ndarray
-    velocity: np.ndarray
-    force: np.ndarray
-    iterations: np.ndarray
-    over: str = "time"
-    solver: str = ""
-    objective: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse columns of other lengths."""
-        sizes = {len(a) for a in (self.x, self.velocity, self.force, self.iterations)}
-        if len(sizes) != 1 or self.over not in ("time", "iteration"):
-            raise ValueError(f"convergence: columns of {sorted(sizes)} rows over {self.over!r}")
-
-    def __len__(self) -> int:
-        return len(self.x)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain lists."""
-        columns = {k: np.asarray(getattr(self, k)).tolist() for k in ("x", "velocity", "force", "iterations")}
-        return {"over": self.over, "solver": self.solver} | columns
-
-    def plot(self, path: str | os.PathLike | None = None) -> Any:
-        """Plot both residuals, in logarithmic scale; returns the figure, or writes it to ``path``."""
-        from ..view.force_plots import plot_convergence
-
-        return plot_convergence([self], path)
 
 
 STICK, SLIP, OPEN = 0, 1, 2
@@ -183,7 +133,7 @@ class Contacts:
     friction : ndarray (k,)
         The coefficient that was used.
     history : Convergence or None
-        Convergence of each solve of the run, if requested.
+        Residuals of the solves over their iterations, with ``fb.Stepping(history=...)``.
     planar : bool
     """
 
@@ -264,7 +214,7 @@ class Contacts:
         begin = np.r_[0, np.cumsum(self.count[times])]
         rows = np.arange(begin[-1]) + np.repeat(np.asarray(self.begin)[times] - begin[:-1], self.count[times])
         own = {name: getattr(self, name)[rows] for name in CONTACT_COLUMNS}
-        return replace(self, t=self.t[times], begin=begin, history=None, **own)
+        return replace(self, t=self.t[times], begin=begin, **own)
 
     def between(self, a: str, b: str) -> PairForce:
         """Return the contact force of ``a`` on ``b`` over time: the sum over all their contacts.
@@ -365,7 +315,8 @@ def concatenate_contacts(every: Sequence[Contacts], t: np.ndarray) -> Contacts:
     """Concatenate contacts of consecutive times."""
     begin = np.concatenate([[0], *(c.count for c in every)]).cumsum()
     columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in every]) for name in CONTACT_COLUMNS}
-    return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, **columns)
+    history = concatenate_histories([c.history for c in every if c.history is not None])
+    return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, history=history, **columns)
 
 
 def _text_array(names: list[str]) -> np.ndarray:

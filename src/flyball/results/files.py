@@ -27,7 +27,8 @@ import numpy as np
 from ..model.output_files import write_file
 from ..model.quantities import ENERGY, quantities
 from ..tables.values import Values, values
-from .contacts import CONTACT_COLUMNS, ContactBodies, Contacts, Convergence
+from .contacts import CONTACT_COLUMNS, ContactBodies, Contacts
+from .convergence import RESIDUALS, Convergence
 from .events import EventRecord, Phase, phases_or_none
 from .part_views.bodies import SET_MEMBER_ARRAYS, BodySetMotion
 from .part_views.bodies import SET_MOTION_ARRAYS as OVER_TIME
@@ -88,7 +89,6 @@ def _read_variable(variable: Any) -> Any:
     return np.ascontiguousarray(variable[...])
 
 
-HISTORY_COLUMNS = ("x", "velocity", "force", "iterations")
 StoredData = dict[str, Any]
 
 
@@ -106,8 +106,8 @@ def pack_contacts(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]
         texts["sides"] = json.dumps({"names": c.sides.names, "counts": c.sides.counts})
         arrays |= {f"contact_{name}": getattr(c, name) for name in ("begin", *CONTACT_COLUMNS)}
         if c.history is not None:
-            texts["history"] = json.dumps({"over": c.history.over, "solver": c.history.solver})
-            arrays["contact_history"] = np.array([getattr(c.history, name) for name in HISTORY_COLUMNS], float)
+            texts["history"] = c.history.solver
+            arrays |= {f"history_{name}": getattr(c.history, name) for name in ("t", "begin", "iteration", *RESIDUALS)}
     return texts, {name: np.asarray(values, float) for name, values in arrays.items()}
 
 
@@ -133,8 +133,8 @@ def unpack_contacts(stored: StoredData, result: Result) -> None:
         columns[name] = np.ascontiguousarray(stored[f"contact_{name}"].astype(kind))
     history = None
     if "history" in stored:
-        x, velocity, force, count = stored["contact_history"]
-        history = Convergence(x, velocity, force, count.astype(int), **json.loads(stored["history"]))
+        own = {name: stored[f"history_{name}"] for name in ("t", "iteration", *RESIDUALS)}
+        history = Convergence(begin=stored["history_begin"].astype(int), solver=stored["history"], **own)
     planar = result.model.planar
     result.contacts = Contacts(
         t=result.t, sides=ContactBodies(sides["names"], sides["counts"]), history=history, planar=planar, **columns

@@ -208,6 +208,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
 
 RESTITUTION_LAWS = ("poisson", "newton", "moreau")
 CONVEX_ONLY_SOLVERS = ("barzilai-borwein",)
+ALL_STEPS = "all"  # Stepping.history
 PYRAMID, LEAST_DIRECTIONS, DEFAULT_DIRECTIONS = "pyramid", 3, 8
 IMPACT_ORDERS = ("simultaneous", "sequential")
 
@@ -247,6 +248,9 @@ class Stepping:
     impacts : {"simultaneous", "sequential"}
         Whether simultaneous impacts are solved together, or one contact after the other, the fastest first, as in
         Newton's cradle.
+    history : "all", int or (float, float) [s], optional
+        Steps whose residuals over the iterations are kept in ``run.contacts.history``: all, every n-th, or those that
+        end within a range of time. The motion does not change; each such solve is repeated with fewer iterations.
     """
 
     step: float | str | None = None
@@ -258,6 +262,7 @@ class Stepping:
     coulomb: bool = True
     restitution: str = "poisson"
     impacts: str = "simultaneous"
+    history: str | int | tuple[float, float] | None = None
 
     limit: ClassVar[float] = math.inf  # of the default step [s]: max_step
 
@@ -283,7 +288,7 @@ class Stepping:
                 f"impacts='sequential' of Stepping uses Poisson's law, so restitution={self.restitution!r} has no "
                 "effect; leave one of the two out"
             )
-
+        self._check_history()
         if self.directions is not None and self.solver != PYRAMID:
             raise ModelError(f"directions of Stepping is for solver={PYRAMID!r}, not {self.solver!r}; leave it out")
         if self.directions is not None:
@@ -294,6 +299,19 @@ class Stepping:
             raise ModelError(
                 f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"
             )
+
+    def _check_history(self) -> None:
+        """Check the choice of steps whose residuals are kept."""
+        x: Any = self.history
+        if x is None or x == ALL_STEPS or (isinstance(x, int) and not isinstance(x, bool) and x > 0):
+            return
+        numbers = isinstance(x, (tuple, list)) and all(isinstance(t, (int, float, np.number)) for t in x)
+        if not numbers or len(x) != 2 or not x[0] <= x[1]:
+            raise ModelError(
+                f"history of Stepping is {x!r}; give {ALL_STEPS!r}, a number n (every n-th step), or a range of time "
+                "(from, to)"
+            )
+        object.__setattr__(self, "history", tuple(float(t) for t in x))
 
     def bounded(self, longest: float) -> Stepping:
         """Return the options with steps of at most ``longest`` seconds; default steps may still be divided."""

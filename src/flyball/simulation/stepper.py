@@ -432,6 +432,10 @@ def _way_of_motion(model: Model, o: StepperOptions) -> str:
         )
     if o.step is not None:
         raise ModelError(f"{IMPULSE_STEPPING} takes its step as method=fb.Stepping(step=...); leave step= out")
+    if isinstance(o.method, Stepping) and o.method.history is not None:
+        raise ModelError(
+            f"a stepper of {name!r} has no result that would keep history={o.method.history!r}; leave it out"
+        )
     if o.rtol is not None:
         raise ModelError(f"rtol has no effect with {IMPULSE_STEPPING}; leave it out")
     if o.coordinates == "joint":

@@ -387,6 +387,8 @@ class StudyOptions(SimulateOptions):
                 continue
             if getattr(self, f.name) != usual[f.name].default:
                 raise ModelError(f"{f.name} does nothing with analysis={self.single.title!r}; leave it out")
+        if isinstance(self.method, Stepping) and self.method.history is not None:
+            raise ModelError(f"a study keeps no contacts, so history={self.method.history!r} of Stepping does nothing")
 
     def question(self, model: Model) -> RunSpecification:
         """The specification of the runs."""

@@ -19,7 +19,8 @@ from .plotting import LEGEND_BESIDE, PALETTE, finish_figure, new_figure, panels_
 from .recording import Channel, Panel
 
 if TYPE_CHECKING:
-    from ..results.contacts import Contacts, Convergence
+    from ..results.contacts import Contacts
+    from ..results.convergence import Convergence
     from ..results.inverse_dynamics import InverseDynamics
 
 
@@ -73,27 +74,30 @@ def _largest_pairs(contacts: Contacts) -> list[tuple[str, ...]]:
 
 
 def plot_convergence(histories: Sequence[Convergence], path: str | os.PathLike | None = None) -> Any:
-    """Draw residuals as velocities and as forces, in logarithmic scale; several solvers beside each other.
+    """Draw residuals over the iterations: as velocities, complementarity, energy; a curve for each step.
 
     Raises
     ------
     ModelError
-        If they are over different quantities, or the file cannot be written.
+        If there is nothing to draw, or the file cannot be written.
     """
-    over = {h.over for h in histories}
-    if len(over) != 1:
-        raise ModelError("convergence: give histories that are all over time, or all over iterations")
-    unit = "time [s]" if over == {"time"} else "iteration"
+    if not any(len(h) for h in histories):
+        raise ModelError("no step with contacts was recorded, so there are no residuals to draw")
     with plot_style():
-        drawing = new_figure(5.4)
-        axes = drawing.subplots(2, 1, sharex=True)
-        for ax, what, label in zip(axes, ("velocity", "force"), ("residual [m/s]", "residual force [-]"), strict=True):
+        drawing = new_figure(7.2)
+        axes = drawing.subplots(4, 1, sharex=True)
+        for ax, what in zip(axes, ("velocity", "primal", "complementarity", "energy"), strict=True):
             for k, h in enumerate(histories):
-                values = np.where(np.asarray(getattr(h, what)) > 0.0, getattr(h, what), np.nan)
-                ax.semilogy(h.x, values, label=h.solver or "solves", color=PALETTE[k % len(PALETTE)])
-            ax.set_ylabel(label)
-            ax.legend(**LEGEND_BESIDE)
-        axes[-1].set_xlabel(unit)
+                for n, step in enumerate(h):
+                    values = getattr(step, what)
+                    values = values if what == "energy" else np.where(values > 0.0, values, np.nan)
+                    look = {"color": PALETTE[k % len(PALETTE)], "linestyle": ("-", "--", ":")[k % 3], "lw": 1.2}
+                    ax.plot(step.iteration, values, label=h.solver if n == 0 else None, **look)
+            if what != "energy":
+                ax.set_yscale("log")
+            ax.set_ylabel(f"{'residual' if what == 'velocity' else what} [{histories[0].units[what]}]")
+        axes[0].legend(**LEGEND_BESIDE)
+        axes[-1].set_xlabel("iteration")
         set_title(drawing, "residuals of contact solves")
         return finish_figure(drawing, path)
 

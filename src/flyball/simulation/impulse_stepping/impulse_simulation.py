@@ -248,6 +248,8 @@ def make_impulse_result(
     sums = np.array(recorder.sums)
     result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T[:-1], strict=True))
     result.contacts = recorder.as_contacts(contact_bodies, model.planar)
+    if stepper.recorder is not None:
+        result.contacts = dataclasses.replace(result.contacts, history=stepper.recorder.convergence())
     result.bulk = body_sets(model, scene, recorder)
     result.record = record_motion(result, accelerations=False)
     health.late = diagnostics.impulse_judgements(result, partial(mobility, model, base))

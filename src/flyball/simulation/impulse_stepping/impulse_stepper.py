@@ -24,6 +24,7 @@ from ...numerics.complementarity.contact_problem import (
 from ...tables.table_definitions import Surfaces, assign, copied, named_arrays
 from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
+from .solve_recorder import SolveRecorder
 from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
 from .stepping_tables import (
     NO_SOLUTION,
@@ -219,6 +220,7 @@ class ImpulseStepper:
             state.tolerances.velocity
         )  # allowed residual of velocities [m/s] in a step that is not very short
         self.halved = 0  # steps that were divided
+        self.recorder: SolveRecorder | None = None  # of the residuals of solves
         self._arguments: list[StructBuffer] = []  # of the step loop; empty after a table was replaced
         self._addresses: list[int] = []
         self._gravity = float(np.linalg.norm(state.gravity))
@@ -299,6 +301,8 @@ class ImpulseStepper:
         """Take ``state.counts.steps_left`` steps, enlarging tables that are full."""
         self.state.addresses.search = self.finder.address
         while True:
+            if self.recorder is not None:
+                self.recorder.attach()
             if not self._arguments:
                 self._arguments = self._loop_arguments()
                 self._addresses = [x.address for x in self._arguments]

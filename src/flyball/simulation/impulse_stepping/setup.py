@@ -46,6 +46,7 @@ from ..integration_intervals import Segment
 from ..integration_options import DEFAULT_DIRECTIONS, PYRAMID, RESTITUTION_LAWS, Stepping
 from .impulse_stepper import ImpulseStepper, free_bodies
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
+from .solve_recorder import SolveRecorder
 from .stepping_tables import (
     LINE_FRICTION,
     LINE_ROPE,
@@ -623,6 +624,8 @@ def make_stepper(
             f"solver {PYRAMID!r} of Stepping has no rolling or spinning friction; leave rolling_friction and "
             "spinning_friction out, or choose another solver"
         )
+    if o.history is not None:
+        stepper.recorder = SolveRecorder(stepper, o.history)
     choices = stepper.workspaces.O.count
     choices.coulomb = o.coulomb
     choices.directions = o.directions or DEFAULT_DIRECTIONS
