@@ -125,6 +125,9 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import StartWarning as StartWarning
     from .errors import UnitError as UnitError
     from .forces import *
+    from .forces.tyres import FialaTyre as FialaTyre
+    from .forces.tyres import LinearTyre as LinearTyre
+    from .forces.tyres import MagicFormula as MagicFormula
     from .joints import *
     from .kinematics.prepared import Prepared as Prepared
     from .mechanism import Mechanism as Mechanism
@@ -208,6 +211,11 @@ _HOME = {
     "MaterialPair": "model.contact",
     "Sensor": "model.controller",
     "IMU": "model.controller",
+    "Road": "model.road",
+    "RoadProfile": "model.road",
+    "LinearTyre": "forces.tyres",
+    "FialaTyre": "forces.tyres",
+    "MagicFormula": "forces.tyres",
     "Table": "model.table",
     "Table2D": "model.table_2d",
     "load": "mechanism",
@@ -293,4 +301,6 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "ConvexSolid", "Surface"})
+    return sorted(
+        {*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "ConvexSolid", "Surface", "TyreModel", "ScaledTyre"}
+    )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ModelError
+from ...forces import Tyre
 from ...model.body import Body, Driver, Frame
 from ...model.contact_point import Touch
 from ...model.controller import IMU, Controller, Sensor
@@ -16,7 +17,7 @@ from ...model.force import Force
 from ...model.joint import Coupling, Joint
 from .base import PartView as PartView
 from .bodies import FrameView
-from .forces import ContactPlaceView, ForceView
+from .forces import ContactPlaceView, ForceView, TyreView
 from .joints import ControllerView, CouplingView, DriverView, IMUView, JointView, SensorView
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ VIEWS: tuple[tuple[type, type[PartView]], ...] = (
     (Joint, JointView),
     (Coupling, CouplingView),
     (Touch, ContactPlaceView),
+    (Tyre, TyreView),
     (Force, ForceView),
     (Controller, ControllerView),
     (Driver, DriverView),

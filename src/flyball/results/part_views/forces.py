@@ -33,10 +33,19 @@ class ForceView(PartView):
         e, S = self.element, self._x.system
         k = self._index()
         F, M, par = self._frames
+        if e.states():
+            force, torque, rates = e.wrench_and_rates(par, F, M, self._states, S.const, S.surfaces)
+            return rates, force, torque
         a, b = (np.broadcast_to(i, (self._result.motions.n,)) for i in e.inputs(par, F, M))
         laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
         force, torque = e.wrench(par, F, M, laws, (a, b))
         return (a, b), force, torque
+
+    @property
+    def _states(self) -> tuple[np.ndarray, np.ndarray]:
+        """The two states of a force over time."""
+        at = int(self._x.system.forces.state[self._index()])
+        return self._result.states[:, at], self._result.states[:, at + 1]
 
     @property
     def _frames(self) -> tuple[tuple, tuple, Any]:
@@ -252,6 +261,22 @@ class ForceView(PartView):
         """Return its outputs; for other elements, the components of force and torque that are not zero all the time."""
         out = super().channels()
         return out if self.element.outputs else {k: v for k, v in out.items() if v[1].any()}
+
+
+class TyreView(ForceView):
+    """Slips, forces and moments of a tyre in its W axes, and its contact point."""
+
+    @cached_property
+    def _figures(self) -> dict[str, np.ndarray]:
+        F, M, par = self._frames
+        S = self._x.system
+        found = self.element.figures(par, F, M, self._states, S.const, S.surfaces)
+        n = len(self._result.t)
+        return {k: np.broadcast_to(x, (n,)) for k, x in zip(self.element.outputs, found, strict=True)}
+
+    def _found(self, name: str) -> np.ndarray:
+        """One of its outputs; force and torque on the wheel."""
+        return self._figures[name] if name in self.element.outputs else self._whole[name == "torque"]
 
 
 class ContactPlaceView(PartView):
