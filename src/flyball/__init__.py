@@ -213,6 +213,8 @@ _HOME = {
     "IMU": "model.controller",
     "Road": "model.road",
     "RoadProfile": "model.road",
+    "RandomRoad": "model.random_road",
+    "OpenCRG": "model.opencrg",
     "LinearTyre": "forces.tyres",
     "FialaTyre": "forces.tyres",
     "MagicFormula": "forces.tyres",

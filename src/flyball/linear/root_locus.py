@@ -467,7 +467,7 @@ def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     refuse_unsupported(model, "root_locus", controlled=True)
     refuse_sampled_controllers(model, "root_locus")
     points = checked_values(model, o.parameter, o.values, o.t, o.parameters)
-    rest = (_ControlledEquilibria if model.controllers else _EquilibriumBranch)(model, o, points)
+    rest = (_ControlledEquilibria if model.with_states() else _EquilibriumBranch)(model, o, points)
 
     def at(place: float) -> EigenvalueSample:
         value = float(np.interp(place, np.arange(len(points)), points))

@@ -83,7 +83,7 @@ class RoadProfile(RoadSurface):
     track : number [m]
         Distance of the two tracks.
     width : number [m]
-        Of the road; its middle is y = 0.
+        Of the road; its middle is y = 0. 100 m if not given, or twice the track.
     """
 
     heights: PlainNumbers
@@ -91,7 +91,7 @@ class RoadProfile(RoadSurface):
     start: float = 0.0
     right: PlainNumbers | None = None
     track: float | None = None
-    width: float = 100.0
+    width: float | None = None
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse heights that make no profile."""
@@ -99,7 +99,7 @@ class RoadProfile(RoadSurface):
             z = getattr(self, name)
             if z is not None and (len(z) < 2 or not np.isfinite(z).all()):
                 raise ModelError(f"{self.title}: {name} must be two or more finite numbers, got {reprlib.repr(z)}")
-        if not self.spacing > 0.0 or not self.width > 0.0:
+        if not self.spacing > 0.0 or not self.wide > 0.0:
             raise ModelError(
                 f"{self.title}: spacing and width must be greater than 0, got {self.spacing}, {self.width}"
             )
@@ -109,20 +109,22 @@ class RoadProfile(RoadSurface):
             raise ModelError(
                 f"{self.title}: heights has {len(self.heights)} numbers and right {len(self.right)}; give as many"
             )
-        if self.track is not None and not 0.0 < self.track < self.width:
-            raise ModelError(
-                f"{self.title}: track must be between 0 and the width {self.width:g} m, got {self.track:g}"
-            )
+        if self.track is not None and not 0.0 < self.track < self.wide:
+            raise ModelError(f"{self.title}: track must be between 0 and the width {self.wide:g} m, got {self.track:g}")
+
+    @property
+    def wide(self) -> float:
+        """Return its width."""
+        return self.width if self.width is not None else 2.0 * self.track if self.track is not None else WIDTH
 
     def grid(self) -> RoadGrid:
         """Return the profile across the width: 4 rows, or with two tracks rows at multiples of a quarter of these."""
         z = np.array(self.heights)
         if self.right is None or self.track is None:
-            return RoadGrid(
-                np.repeat(z[:, None], 4, axis=1), (self.start, self.spacing), (-self.width / 2, self.width / 3)
-            )
+            across = (-0.5 * self.wide, self.wide / 3.0)
+            return RoadGrid(np.repeat(z[:, None], 4, axis=1), (self.start, self.spacing), across)
         step = self.track / TRACK_CELLS
-        half = int(np.ceil(self.width / 2 / step))
+        half = int(np.ceil(0.5 * self.wide / step - 1e-9))
         y = step * np.arange(-half, half + 1)
         share = np.clip(0.5 + y / self.track, 0.0, 1.0)
         heights = np.array(self.right)[:, None] * (1.0 - share) + z[:, None] * share
@@ -130,6 +132,7 @@ class RoadProfile(RoadSurface):
 
 
 TRACK_CELLS = 4  # between two tracks
+WIDTH = 100.0  # m: of a road with one profile
 
 
 @element
