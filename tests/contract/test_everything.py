@@ -100,6 +100,16 @@ def everything():
         )
     )
     m.add(fb.TorsionalSpringDamper("torsion", joint="C", stiffness=3.0, damping=0.1, angle=0.2, torque="0.1*angle**3"))
+    tyre = fb.FialaTyre(
+        radius=0.9,
+        stiffness=30.0,
+        damping=0.5,
+        nominal_load=3.0,
+        slip_stiffness=20.0,
+        cornering_stiffness=15.0,
+        trail=0.02,
+    )
+    m.add(fb.Road("road", position=(0, 0, -1)), fb.Tyre("tyre", "road", "e", at=(2, 0.4, -0.3), model=tyre))
     return m
 
 

@@ -62,7 +62,7 @@ class RandomRoad(RoadSurface):
         """Refuse numbers that make no road."""
         if isinstance(self.roughness, str) and self.roughness not in tuple(CLASSES):
             raise ModelError(
-                f"{self.title}: roughness is {self.roughness!r}; give a class of ISO 8608, 'A' to 'H', or a number of m^3"
+                f"{self.title}: roughness is {self.roughness!r}; give a class of ISO 8608, 'A' to 'H', or a number"
             )
         if not isinstance(self.roughness, str) and not self.roughness > 0.0:
             raise ModelError(f"{self.title}: roughness is {self.roughness:g} m^3; it must be greater than 0")
