@@ -21,6 +21,7 @@ Describe a mechanism
     couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque
+    vehicles      Tyre on a Road; LinearTyre, FialaTyre, MagicFormula; RoadProfile, RandomRoad, OpenCRG
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,

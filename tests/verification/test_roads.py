@@ -7,7 +7,7 @@ import flyball as fb
 from flyball.forces.tyres.road_height import pack_curved, pack_straight, road_height
 
 
-@pytest.mark.parametrize("letter, value", [("A", 16e-6), ("C", 256e-6), ("H", 262144e-6)])
+@pytest.mark.parametrize(("letter", "value"), [("A", 16e-6), ("C", 256e-6), ("H", 262144e-6)])
 def test_the_spectrum_of_a_random_road_is_the_standards(letter, value):
     """Periodogram of the heights: G_d(n0) (n / n0)^-w at every frequency of the range, nothing elsewhere."""
     road = fb.RandomRoad(roughness=letter, length=500.0, spacing=0.1, waviness=2.2, seed=7)

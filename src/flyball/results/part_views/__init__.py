@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ModelError
-from ...forces import Tyre
 from ...model.body import Body, Driver, Frame
 from ...model.contact_point import Touch
 from ...model.controller import IMU, Controller, Sensor
@@ -17,7 +16,7 @@ from ...model.force import Force
 from ...model.joint import Coupling, Joint
 from .base import PartView as PartView
 from .bodies import FrameView
-from .forces import ContactPlaceView, ForceView, TyreView
+from .forces import ContactPlaceView, ForceView
 from .joints import ControllerView, CouplingView, DriverView, IMUView, JointView, SensorView
 
 if TYPE_CHECKING:
@@ -29,7 +28,6 @@ VIEWS: tuple[tuple[type, type[PartView]], ...] = (
     (Joint, JointView),
     (Coupling, CouplingView),
     (Touch, ContactPlaceView),
-    (Tyre, TyreView),
     (Force, ForceView),
     (Controller, ControllerView),
     (Driver, DriverView),

@@ -41,6 +41,14 @@ class ForceView(PartView):
         force, torque = e.wrench(par, F, M, laws, (a, b))
         return (a, b), force, torque
 
+    @cached_property
+    def _figures(self) -> dict[str, np.ndarray]:
+        """Outputs of a force with states."""
+        F, M, par = self._frames
+        S, n = self._x.system, len(self._result.t)
+        found = self.element.figures(par, F, M, self._states, S.const, S.surfaces)
+        return {k: np.broadcast_to(x, (n,)) for k, x in zip(self.element.outputs, found, strict=True)}
+
     @property
     def _states(self) -> tuple[np.ndarray, np.ndarray]:
         """The two states of a force over time."""
@@ -243,6 +251,8 @@ class ForceView(PartView):
             return np.sqrt((pull * pull).sum(axis=1))
         if name not in outputs:
             return self._whole[name == "torque"]
+        if self.element.states():
+            return self._figures[name]
         k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
             value = self._whole_along()[k]
@@ -261,22 +271,6 @@ class ForceView(PartView):
         """Return its outputs; for other elements, the components of force and torque that are not zero all the time."""
         out = super().channels()
         return out if self.element.outputs else {k: v for k, v in out.items() if v[1].any()}
-
-
-class TyreView(ForceView):
-    """Slips, forces and moments of a tyre in its W axes, and its contact point."""
-
-    @cached_property
-    def _figures(self) -> dict[str, np.ndarray]:
-        F, M, par = self._frames
-        S = self._x.system
-        found = self.element.figures(par, F, M, self._states, S.const, S.surfaces)
-        n = len(self._result.t)
-        return {k: np.broadcast_to(x, (n,)) for k, x in zip(self.element.outputs, found, strict=True)}
-
-    def _found(self, name: str) -> np.ndarray:
-        """One of its outputs; force and torque on the wheel."""
-        return self._figures[name] if name in self.element.outputs else self._whole[name == "torque"]
 
 
 class ContactPlaceView(PartView):
