@@ -61,9 +61,11 @@ USES = {
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
     "Tyre": 'fb.Tyre("tyre", "road", "front left", model=fb.MagicFormula(path="205_60R15.tir"), side="left")',
-    "LinearTyre": "fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)",
+    "LinearTyre": (
+        "fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)"
+    ),
     "FialaTyre": (
-        "fb.FialaTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4, friction=0.9)"
+        "fb.FialaTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)"
     ),
     "MagicFormula": 'fb.MagicFormula(path="205_60R15.tir", coefficients={"LMUY": 0.8})',
     "Road": 'fb.Road("road", surface=fb.RandomRoad(roughness="C", length=200), friction=0.7)',

@@ -328,6 +328,7 @@ def test_one_complex_parameter_makes_all_complex():
     s = structure(mechanisms.example("slider_crank.toml"))
     x = values(s, {"speed": 10.0 + 1j * STEP})
     floats = {k: a.dtype for k, a in x.system._asdict().items() if isinstance(a, np.ndarray) and a.dtype.kind != "i"}
+    del floats["surfaces"]  # no parameter changes them
     assert set(floats.values()) == {np.dtype(complex)}
     assert x.q.dtype == x.v.dtype == allocate_work(s, x.system).G.dtype == complex
     assert not x.system.frames.position.imag.any() and not x.system.frames.rotation.imag.any()

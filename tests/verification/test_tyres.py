@@ -28,7 +28,7 @@ def magic(load, slip, alpha, camber, pressure=None):
 
 @pytest.mark.parametrize("load", [1500.0, 4000.0, 6500.0])
 @pytest.mark.parametrize(
-    "slip, alpha", [(0.0, 0.0), (0.03, 0.0), (0.0, 0.05), (-0.12, 0.08), (0.2, -0.15), (-0.9, 0.3)]
+    ("slip", "alpha"), [(0.0, 0.0), (0.03, 0.0), (0.0, 0.05), (-0.12, 0.08), (0.2, -0.15), (-0.9, 0.3)]
 )
 @pytest.mark.parametrize("camber", [0.0, 0.06, -0.1])
 def test_magic_formula_is_that_of_the_book(load, slip, alpha, camber):

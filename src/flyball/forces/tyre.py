@@ -28,6 +28,7 @@ from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..math.scalar import absolute, asin, atan, cos, integer_power, minimum, sqrt
 from ..math.vec import add, col, cross, dot, mtv, mv, scale, sub
+from ..model.body import GROUND
 from ..model.element import (
     Direction,
     Length,
@@ -238,8 +239,8 @@ class Tyre(TwoFrameForce):
     )
 
     def needs(self) -> str:
-        """Return the road, for its friction."""
-        return self.body_i
+        """Return the road, for its friction; ground has none of its own."""
+        return "" if self.body_i == GROUND else self.body_i
 
     def states(self) -> tuple[str, ...]:
         """Return the deflections of the contact patch."""
@@ -280,7 +281,7 @@ class Tyre(TwoFrameForce):
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the parameters of the formulas."""
         mirrored = self.side is not None and n.tyre.right != (self.side == "right")
-        friction = getattr(n.of, "friction", 1.0)
+        friction = getattr(getattr(n, "of", None), "friction", 1.0)
         return (self.model.kind, -1.0 if mirrored else 1.0, friction, self.points, n.patch, n.low_speed)
 
     def data(self, n: SimpleNamespace) -> tuple[float, ...]:

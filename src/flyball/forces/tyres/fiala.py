@@ -2,8 +2,8 @@
 
 With the normalised slip s = (Ck kappa, -Ca tan(alpha) - Cg gamma) / ((1 + kappa) mu Fz) and r = |s|, the force is mu Fz
 s (1 - r/3 + r^2/27), or mu Fz s / r where all of the patch slides, r >= 3 (Fiala 1954; combined slip: Pacejka, *Tire
-and Vehicle Dynamics*, 2012, section 3.2.3, Hindiyeh and Gerdes 2014). The pneumatic trail falls from its value at zero
-slip by t / t0 = (1 - r/3)^3 / (1 - r/3 + r^2/27) (ibid., equation 3.13).
+and Vehicle Dynamics*, 2012, section 3.2.3, Hindiyeh and Gerdes 2014). A wheel that runs backwards has 1 - kappa. The
+pneumatic trail falls from its value at zero slip by t / t0 = (1 - r/3)^3 / (1 - r/3 + r^2/27) (ibid., equation 3.13).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def slip_forces(data, at, friction, slip, tangent, camber, load, motion):
     """Return forces and moments; see the module's docstring."""
     mu = friction * data[at + FRICTION]
     o = 0.0 * (slip + tangent)
-    rolled = mu * maximum(slip + 1.0, o + LOCKED)
+    rolled = mu * maximum(slip * motion[0] + 1.0, o + LOCKED)
     x = data[at + SLIP] * slip / rolled
     y = -(data[at + CORNERING] * tangent + data[at + CAMBER] * camber) / rolled
     r = sqrt(x * x + y * y + SMALL * SMALL)
