@@ -60,6 +60,18 @@ USES = {
     "Detent": 'fb.Detent("notches", "A.angle", pitch="30 deg", holding="2 N*m")',
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
+    "Tyre": 'fb.Tyre("tyre", "road", "front left", model=fb.MagicFormula(path="205_60R15.tir"), side="left")',
+    "LinearTyre": (
+        "fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)"
+    ),
+    "FialaTyre": (
+        "fb.FialaTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)"
+    ),
+    "MagicFormula": 'fb.MagicFormula(path="205_60R15.tir", coefficients={"LMUY": 0.8})',
+    "Road": 'fb.Road("road", surface=fb.RandomRoad(roughness="C", length=200), friction=0.7)',
+    "RoadProfile": "fb.RoadProfile(heights=[0, 0, 0.05, 0.1, 0.1], spacing=0.2)",
+    "RandomRoad": 'fb.RandomRoad(roughness="B", length=200, track=1.6, seed=3)',
+    "OpenCRG": 'fb.OpenCRG(path="belgian_block.crg")',
     "PathSpring": 'fb.PathSpring("tendon", ("forearm", "pulley", "finger"), stiffness="2e3 N/m", force="5*command")',
     "PointForce": 'fb.PointForce("push", "cart", force=(10, 0), at=(0, 0.1))',
     "PointTorque": 'fb.PointTorque("drive", "wheel", torque=5)',

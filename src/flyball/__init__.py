@@ -22,6 +22,7 @@ Describe a mechanism
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, Rubber, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque,
                   WheelOnRail
+    vehicles      Tyre on a Road; LinearTyre, FialaTyre, MagicFormula; RoadProfile, RandomRoad, OpenCRG
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,
@@ -126,6 +127,9 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import StartWarning as StartWarning
     from .errors import UnitError as UnitError
     from .forces import *
+    from .forces.tyres import FialaTyre as FialaTyre
+    from .forces.tyres import LinearTyre as LinearTyre
+    from .forces.tyres import MagicFormula as MagicFormula
     from .joints import *
     from .kinematics.prepared import Prepared as Prepared
     from .mechanism import Mechanism as Mechanism
@@ -209,6 +213,13 @@ _HOME = {
     "MaterialPair": "model.contact",
     "Sensor": "model.controller",
     "IMU": "model.controller",
+    "Road": "model.road",
+    "RoadProfile": "model.road",
+    "RandomRoad": "model.random_road",
+    "OpenCRG": "model.opencrg",
+    "LinearTyre": "forces.tyres",
+    "FialaTyre": "forces.tyres",
+    "MagicFormula": "forces.tyres",
     "Table": "model.table",
     "Table2D": "model.table_2d",
     "load": "mechanism",
@@ -294,4 +305,6 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "ConvexSolid", "Surface"})
+    return sorted(
+        {*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "ConvexSolid", "Surface", "TyreModel", "ScaledTyre"}
+    )

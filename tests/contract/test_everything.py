@@ -109,6 +109,16 @@ def everything():
     )
     m.add(fb.WheelOnRail("wheel", "ground", "e", at=(2, 0.4, -1.2), axis=(0, 1, 0), radius=0.4, conicity=0.05, **SOFT))
     m.add(fb.TorsionalSpringDamper("torsion", joint="C", stiffness=3.0, damping=0.1, angle=0.2, torque="0.1*angle**3"))
+    tyre = fb.FialaTyre(
+        radius=0.9,
+        stiffness=30.0,
+        damping=0.5,
+        nominal_load=3.0,
+        slip_stiffness=20.0,
+        cornering_stiffness=15.0,
+        trail=0.02,
+    )
+    m.add(fb.Road("road", position=(0, 0, -1)), fb.Tyre("tyre", "road", "e", at=(2, 0.4, -0.3), model=tyre))
     return m
 
 

@@ -18,8 +18,8 @@ from flyball.testing.formula_checks import (
     wrench_power,
 )
 
-BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce) and not k.takes_splines]
-"""Those given by curves have tests of their own: test_wheel_on_rail."""
+BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce) and not k.takes_splines and hasattr(k, "wrench")]
+"""Those given by curves, or with states of their own, are in `test_wheel_on_rail` and `test_tyres`."""
 ALONG = [k for k in (*forces.ALL, *forces.LIMITS) if issubclass(k, CoordinateForce) and hasattr(k, "effort")]
 LAWS = (1.0, -2.0, 0.5)
 NO_LAWS = (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..model.controller import Controller, ControlState
-from ..model.element import Law, Laws, Name, Number, element, python_data
+from ..model.element import Law, Laws, Name, NamedNumbers, element, python_data
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import number
 from ..model.names import curve_parts
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 
-def _pairs(value: Any) -> Any:
-    """Return names with values as pairs."""
-    return tuple((k, python_data(x)) for k, x in value.items()) if isinstance(value, Mapping) else python_data(value)
-
-
 def _as_list(value: Any) -> Any:
     """Return a list; a single law becomes a list of one."""
     return (value,) if isinstance(value, (str, int, float)) or callable(value) else python_data(value)
@@ -34,10 +29,6 @@ def _as_list(value: Any) -> Any:
 
 Coordinates = Annotated[tuple[str, ...], BeforeValidator(_as_list, json_schema_input_type=str | tuple[str, ...])]
 JointLaws = Annotated[Laws, BeforeValidator(_as_list, json_schema_input_type=Law | Laws)]
-Values = Annotated[
-    tuple[tuple[str, Number], ...],
-    BeforeValidator(_pairs, json_schema_input_type=dict[str, Number] | tuple[tuple[str, Number], ...]),
-]
 DERIVATIVES = {"reference_rate": "reference", "reference_acceleration": "reference_rate"}
 """Laws that are, if not given, derivatives by time of others."""
 MAX_CACHED = 8  # controllers whose formulas are cached for each mechanism
@@ -58,7 +49,7 @@ class JointController(Controller):
     reference_rate: JointLaws = ()
     base: Name | None = None
     ignored: tuple[Name, ...] = ()
-    parameters: Values = ()
+    parameters: NamedNumbers = ()
 
     in_files: ClassVar[bool] = False
 

@@ -452,7 +452,10 @@ def sparsity_pattern(s: Structure, S: System) -> Any:
     )
     expand = sp.csr_matrix((np.ones(len(body)), (body, np.arange(len(body)))), shape=(nb, len(body)))
     sensed, rows = lines[nr:], lines[:nr]
-    laws = sp.csr_matrix(np.tile(np.isin(body, also), (len(s.controls), 1)))
+    states = np.tile(np.isin(body, also), (len(s.controls), 1))
+    for k in np.flatnonzero(table.state >= 0):
+        states[table.state[k] : table.state[k] + 2] = np.isin(body, S.frame_body[[table.F[k], table.M[k]]])
+    laws = sp.csr_matrix(states)
     parts = [expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3, laws]
     return sp.vstack(parts).astype(bool)
 

@@ -12,7 +12,7 @@ from math import nan
 from ..compiler.formulas import dispatch_by_kind, formula, formula_at, generated_formula, has_formula
 from ..constraints.angle import row as angle
 from ..constraints.registry import BY_ADDRESS, KINDS, RARE
-from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WRENCHES
+from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WITH_STATES, WRENCHES
 from ..math.vec import dot, sub
 from ..tables.table_definitions import TERM_KINDS
 from . import rows
@@ -94,6 +94,15 @@ wrench = dispatch_by_kind(
     __name__, "wrench", SIGNATURES[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH, "data"
 )
 """Wrench of a force between frames on M; ``data`` has the splines of those that are given by curves."""
+
+wrench_and_rates = dispatch_by_kind(
+    __name__,
+    "wrench_and_rates",
+    "par, F, M, states, data, surfaces",
+    WITH_STATES,
+    f"({NONE}, {NONE}, ({NAN}, {NAN}))",
+)
+"""Wrench of a force with two states on M, and the rates of these."""
 
 branch = dispatch_by_kind(
     __name__, "branch", SIGNATURES[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH

@@ -29,7 +29,7 @@ from ..tables.table_definitions import (
     SLIDING,
     Sensed,
 )
-from .element_dispatch import effort, force_kind, inputs, wrench
+from .element_dispatch import effort, force_kind, inputs, wrench, wrench_and_rates
 from .kinematics import load_record, project_wrench
 from .rows import (
     characteristic_rate,
@@ -255,34 +255,49 @@ def force_row(T, k):
 
 
 @formula
-def wrench_between_frames(S, W, t, k):
-    """Records of frames F and M of force k between frames, and its wrench on M about M's origin."""
+def wrench_at(S, W, t, k, F, M):
+    """Wrench of force k between frames on M about M's origin, for these records; rates of its two states, or zeros."""
     kind = force_kind(S, k)
-    F = load_record(W.frames, S.forces.F[k])
-    M = load_record(W.frames, S.forces.M[k])
     par = force_row(S.force_parameters, k)
+    if S.forces.state[k] >= 0:
+        c = controller_column(S, W, S.forces.state[k])
+        states = (W.sensed.value[c], W.sensed.value[c + 1])
+        return wrench_and_rates(kind, par, F, M, states, S.const, S.surfaces)
     a, b = inputs(kind, par, F, M)
     x = (t + 0.0 * a, a, b)
     laws = (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x))
     force, torque = wrench(kind, par, F, M, laws, (a, b), S.const)
-    return F, M, force, torque
+    o = 0.0 * force[0]
+    return force, torque, (o, o)
+
+
+@formula
+def wrench_between_frames(S, W, t, k):
+    """Records of frames F and M of force k between frames, its wrench on M about M's origin, rates of its states."""
+    F = load_record(W.frames, S.forces.F[k])
+    M = load_record(W.frames, S.forces.M[k])
+    force, torque, rates = wrench_at(S, W, t, k, F, M)
+    return F, M, force, torque, rates
 
 
 @formula
 def apply_forces(S, W, t, work):
-    """Apply every force between frames to its bodies; write the power of accounted forces to their work rates."""
+    """Apply every force between frames to its bodies; write powers of accounted forces, and rates of forces' states."""
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] != BETWEEN:
             continue
         i = S.forces.F[k]
         j = S.forces.M[k]
-        F, M, force, torque = wrench_between_frames(S, W, t, k)
+        F, M, force, torque, rates = wrench_between_frames(S, W, t, k)
         if S.frame_body[j] >= 0:
             apply_wrench(W, S.frame_body[j], 1.0, force, torque, M[0])
         if S.frame_body[i] >= 0:
             apply_wrench(W, S.frame_body[i], -1.0, force, torque, M[0])
         if S.forces.work[k] >= 0:
             work[S.forces.work[k]] = wrench_power(F, M, force, torque)
+        if S.forces.state[k] >= 0:
+            work[S.forces.state[k]] = rates[0]
+            work[S.forces.state[k] + 1] = rates[1]
 
 
 @formula

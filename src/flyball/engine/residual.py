@@ -34,7 +34,7 @@ from ..tables.table_definitions import (
     ComplexWork,
 )
 from .calls import CONSTRAINT_GAPS, INERTIAL_TERMS, RESIDUAL_DRIVEN, RESIDUAL_STEPS, RESIDUAL_TERMS, ResidualBatch
-from .element_dispatch import effort, force_kind, inputs, row_biases, row_values, whole_rows, wrench
+from .element_dispatch import effort, force_kind, row_biases, row_values, whole_rows
 from .kinematics import (
     body_motion,
     body_pose,
@@ -58,6 +58,7 @@ from .loads import (
     loads_end,
     reaction_loads,
     sliding_sign,
+    wrench_at,
     wrench_between_frames,
 )
 from .rows import count_measured, row_times, update_controllers
@@ -95,7 +96,7 @@ def residual_terms(S, W, t, vdot, lam, out):
     at = inertial_terms(S, W, t, vdot, out)
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] == BETWEEN:
-            _, M, force, torque = wrench_between_frames(S, W, t, k)
+            _, M, force, torque, _ = wrench_between_frames(S, W, t, k)
             at = wrench_terms(S, W, S.frame_body[S.forces.M[k]], out, at, -1.0, force, torque, M[0])
             at = wrench_terms(S, W, S.frame_body[S.forces.F[k]], out, at, 1.0, force, torque, M[0])
     nr = S.rows.law.shape[0]
@@ -172,8 +173,6 @@ def effort_slopes(S, W, t, k, out):
 @formula
 def wrench_slopes(S, W, t, k, out):
     """Stiffness and damping of force k between frames, by central differences of the pose and motion of M."""
-    kind = force_kind(S, k)
-    par = force_row(S.force_parameters, k)
     F = load_record(W.frames, S.forces.F[k])
     p, R, w, v, alpha, a = load_record(W.frames, S.forces.M[k])
     speed = S.scales.length * W.options.rate + norm(sub(v, F[3]))
@@ -189,10 +188,7 @@ def wrench_slopes(S, W, t, k, out):
             M = (add(p, scale(moved, axis)), R, w, add(v, scale(moving, axis)), alpha, a)
         else:
             M = (p, tilted_rotation(R, scale(moved, axis)), add(w, scale(moving, axis)), v, alpha, a)
-        q, r = inputs(kind, par, F, M)
-        x = (t, q, r)
-        laws = (force_law(S, W, k, 0, x), force_law(S, W, k, 1, x), force_law(S, W, k, 2, x))
-        force, torque = wrench(kind, par, F, M, laws, (q, r), S.const)
+        force, torque, _ = wrench_at(S, W, t, k, F, M)
         s = dot(force, axis) if i < 3 else dot(torque, axis)
         out[k, STIFFNESS + i] -= s * moved / (2.0 * d * d)
         out[k, DAMPING + i] -= s * moving / (2.0 * e * e)

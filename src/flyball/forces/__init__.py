@@ -50,6 +50,8 @@ def _next_kind() -> int:
 
 
 INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
+WITH_STATES = formulas(_HERE, "wrench_and_rates")
+"""Kind -> formula for the wrench of a force with two states, and the rates of these."""
 BRANCHES = formulas(_HERE, "branch")
 """Kind -> formula for the branch of a force's rotation: four numbers and the speed [rad/s] of rotation.
 
@@ -93,4 +95,5 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .shear_pin import ShearPin as ShearPin
     from .spring_damper import SpringDamper as SpringDamper
     from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper
+    from .tyre import Tyre as Tyre
     from .wheel_on_rail import WheelOnRail as WheelOnRail

@@ -102,7 +102,7 @@ class LinearizeOptions(OperatingPointOptions):
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     refuse_cumulative_outputs(model, o.outputs)
-    if model.controllers:
+    if model.with_states():
         return controlled_linear_model(model, o)[0]
     if has_switching_elements(model):
         joined, there, notes = contact_operating_point(model, o, "linearize")

@@ -48,7 +48,7 @@ class ModesOptions(OperatingPointOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Compute the modes about an equilibrium or a steady motion: see `Mechanism.modes`."""
-    if model.controllers:
+    if model.with_states():
         refuse_sampled_controllers(model, "modes")
         refuse_switching_with_controllers(model, SMALL_MOTIONS, JOINTS_INSTEAD)
     elif has_switching_elements(model):
@@ -61,7 +61,7 @@ def _smooth_modes(model: Model, o: ModesOptions) -> Modes:
     """Modes of a mechanism without switching elements, except friction that slides."""
     count, frozen = o.count, o.frozen
     free = DENSE_VELOCITIES if count is None else max(DENSE_FREEDOMS, FREEDOMS_PER_MODE * count)
-    x = o.state(model, None if model.controllers else partial(exceeds_dense_size, free))
+    x = o.state(model, None if model.with_states() else partial(exceeds_dense_size, free))
     if uses_sparse_equations(x, free):
         return _sparse_modes(x, count or DEFAULT_COUNT, frozen)
     f, frame, r = equations_without_inputs(x, frozen)

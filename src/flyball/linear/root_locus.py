@@ -467,7 +467,7 @@ def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     """Compute eigenvalues over a parameter as branches, and the stability changes: see `Mechanism.root_locus`."""
     refuse_unsupported(model, "root_locus", controlled=True)
     points = checked_values(model, o.parameter, o.values, o.t, o.parameters)
-    rest = (_ControlledEquilibria if model.controllers else _EquilibriumBranch)(model, o, points)
+    rest = (_ControlledEquilibria if model.with_states() else _EquilibriumBranch)(model, o, points)
 
     if any(e.sampled for e in model.controllers):
         return _sampled_locus(model, o, points, rest)

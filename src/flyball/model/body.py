@@ -38,8 +38,8 @@ from .element import (
 from .geometry import Orientation, orientation_matrix, rotation_about
 from .inertia import MassProperties, mass_properties
 from .joint import ORIENTATION_ANGLES, Coordinate
+from .linked_files import current_folder
 from .shapes import Solid
-from .shapes.mesh import current_folder
 
 _NAMES = """
     aliceblue antiquewhite aqua aquamarine azure beige bisque black blanchedalmond blue blueviolet brown burlywood

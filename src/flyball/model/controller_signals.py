@@ -130,9 +130,12 @@ CONTROLLER_INPUT = LawOf(None, curves=True)
 
 
 class ConnectedState(NamedTuple):
-    """One state of a controller with its law in terms of measured quantities; for a sampled one also a held signal."""
+    """One state of a controller with its law in terms of measured quantities; for a sampled one also a held signal.
 
-    controller: Controller
+    The states of forces are among them: their rates are given by the forces' formulas, in place of laws.
+    """
+
+    controller: Any  # or a force
     state: str
     law: Expression  # its rate, or its value from the next sample on
     signal: bool = False
@@ -203,6 +206,7 @@ def _controller_states(model: Model) -> list[ConnectedState]:
 
     rates = [connected_state(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
     held = [connected_state(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
+    rates += [ConnectedState(f, name, Expression.constant(0.0)) for f in model.forces for name in f.states()]
     later = [connected_state(e, x.name, x.law) for e in every if e.sampled for x in wiring.states[e.name]]
     return [*rates, *_in_order(held), *later]
 

@@ -90,6 +90,18 @@ Name = Annotated[str, BeforeValidator(_name)]
 Number = Annotated[float | str, BeforeValidator(python_data)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(python_data)]
+
+
+def _pairs(value: Any) -> Any:
+    """Return names with values as pairs."""
+    return tuple((k, python_data(x)) for k, x in value.items()) if isinstance(value, Mapping) else python_data(value)
+
+
+NamedNumbers = Annotated[
+    tuple[tuple[str, Number], ...],
+    BeforeValidator(_pairs, json_schema_input_type=dict[str, Number] | tuple[tuple[str, Number], ...]),
+]
+"""Numbers by names, kept as pairs."""
 Coordinates = Annotated[str | tuple[str, ...], BeforeValidator(_list)]
 """A coordinate such as ``"A.angle"``, or several."""
 Function = Callable[..., Any]
@@ -420,6 +432,26 @@ def checked_size(value: Any, dimension: str | None, where: str) -> Any:
             f"overflow; is its unit right?"
         )
     return value
+
+
+def described_part(base: type[Element] | tuple[type[Element], ...], example: str) -> BeforeValidator:
+    """Return the validator of a field whose value is an element of its own kind, or its table with a ``type``."""
+
+    def convert(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            kind = value.get("type")
+            known = [k for k, c in Element.registry.items() if issubclass(c, base) and "check" in vars(c)]
+            if kind is not None:
+                _registered(str(kind))
+            if kind not in known:
+                problem = "it has no type" if kind is None else f"unknown type {kind!r}"
+                raise ModelError(f"{problem}; there are {', '.join(sorted(known))}")
+            return Element.of_type(str(kind))(**{k: v for k, v in value.items() if k != "type"})
+        if value is not None and not isinstance(value, base):
+            raise ValueError(f"give {example}")
+        return value
+
+    return BeforeValidator(convert)
 
 
 def written_fields(e: Any) -> dict[str, Any]:

@@ -144,7 +144,7 @@ def _refuse_unlike(model: Model, e: Event) -> None:
 
 def _check_action(model: Model, e: Event, a: Action) -> None:
     if isinstance(a, Set):
-        states = [x.name for x in controller_states(model) if not x.signal] if model.controllers else []
+        states = [x.name for x in controller_states(model) if not x.signal] if model.with_states() else []
         if a.parameter in states:
             model.law(a.value, VALUE_LAW, f"value of {a.title} in {e.title}")
             return

@@ -35,7 +35,9 @@ class Force(Element):
     axes; the reverse acts on F's body at the same point. The other acts along a measured quantity x: ``effort(par, x,
     rate, laws, load)``, positive towards larger x (`CoordinateForce`). Either may have an ``energy``. Formulas are
     functions of numbers in the subclass's file, in the package with the decorator `compiler.formulas.formula`; ``kind``
-    numbers them.
+    numbers them. A force between frames with states has ``wrench_and_rates(par, F, M, states, data, surfaces)`` in
+    place of ``wrench``: force and torque on M, and the rates of its states; par[14] and par[15] are the places of its
+    road in ``surfaces`` and of its own numbers in ``data``.
     """
 
     category: ClassVar[str] = "forces"
@@ -51,6 +53,7 @@ class Force(Element):
     ] = {}  # field that names a coordinate -> field that changes sign with its direction
     figures: ClassVar[Callable | None] = None  # values of ``outputs`` of a force between frames
     takes_splines: ClassVar[bool] = False  # whether its wrench has the last argument ``data``; see `curves`
+    sampled: ClassVar[bool] = False  # its states have rates, as those of a continuous controller
     fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 
     def ends(self) -> dict[str, str]:
@@ -75,6 +78,14 @@ class Force(Element):
 
     def laws(self) -> tuple[Law | None, ...]:
         """Return up to three expressions of the formulas."""
+        return ()
+
+    def states(self) -> tuple[str, ...]:
+        """Return the names of its two states; none if it has none."""
+        return ()
+
+    def data(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """Return numbers of the formula `wrench_and_rates` besides the parameters."""
         return ()
 
     def conservative(self) -> bool:
@@ -127,6 +138,7 @@ class TwoFrameForce(Force):
     body_j: str
     _: KW_ONLY
     at: Point | None = None
+    on_bodies: ClassVar[bool] = False  # whether it may act at the origins of two bodies
     inputs: ClassVar[Callable] = staticmethod(no_inputs)
 
     def ends(self) -> dict[str, str]:

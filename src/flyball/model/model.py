@@ -177,6 +177,10 @@ class Model:
         for category in CATEGORIES:
             yield from getattr(self, category)
 
+    def with_states(self) -> list[Element]:
+        """Return controllers, and forces with states of their own."""
+        return [*self.controllers, *(f for f in self.forces if f.states())]
+
     def acting(self) -> list[Force]:
         """Return all elements that act by a formula: forces, and elastic limits."""
         return [e for e in (*self.forces, *self.limits) if isinstance(e, Force) and e.acts()]

@@ -29,10 +29,11 @@ from .event import Event
 from .expression_parser import function_name
 from .force import Force, Unilateral
 from .joint import Coupling, Joint
+from .linked_files import LinkedFile, current_folder, paths_from
 from .messages import listing, suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
-from .shapes.mesh import Mesh, current_folder, paths_from
+from .road import Road
 from .snapshot import CATEGORIES, part_owners
 from .table import Table
 from .table_2d import Table2D
@@ -47,7 +48,6 @@ ONE_KIND = {
     "ground": Ground,
     "bodies": Body,
     "bulk": Bodies,
-    "frames": Frame,
     "drivers": Driver,
     "initial": Initial,
     "contacts": Contact,
@@ -65,8 +65,9 @@ MANY_KINDS = {
     "forces": (Force, "forces"),
     "limits": (Unilateral, "forces"),
 }
-DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit", "tables": "Table"}  # default types
+DEFAULT_KINDS = {"frames": "Frame", "sensors": "Sensor", "limits": "Limit", "tables": "Table"}  # default types
 FEW_KINDS: dict[str, dict[str, type[Element]]] = {
+    "frames": {"Frame": Frame, "Road": Road},
     "sensors": {"Sensor": Sensor, "IMU": IMU},
     "tables": {"Table": Table, "Table2D": Table2D},
 }
@@ -124,11 +125,14 @@ def _require_unchanged(model: Model, e: Element, owner: Element) -> None:
 def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
     """Return the element's fields as plain data, with paths of meshes as seen from the folder."""
     data = written_fields(e)
-    if folder is not None and isinstance(e, (Body, Bodies, Ground)) and "shape" in data:
-        tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
-        for shape, table in zip(e.shapes(), tables, strict=True):
-            if isinstance(shape, Mesh) and shape.path is not None:
-                table["path"] = shape.path_from(folder)
+    if folder is None:
+        return data
+    for name in data:
+        several = isinstance(data[name], list)
+        parts, tables = (x if several else [x] for x in (getattr(e, name), data[name]))
+        for part, table in zip(parts, tables, strict=True):
+            if isinstance(part, LinkedFile) and part.path is not None:
+                table["path"] = part.path_from(folder)
     return data
 
 

@@ -30,6 +30,7 @@ from .names import curve_parts
 from .placement import Placement, product, rotation_of, scaled, total
 from .quantities import ENERGY, quantities
 from .quantity_images import Image, component_image, joint_image, located_image
+from .road import Road
 from .snapshot import part_owners
 
 if TYPE_CHECKING:
@@ -317,6 +318,8 @@ class Subassembly:
         new["shape"] = tuple(made) if isinstance(e.shape, tuple) else made[0] if made else None
 
     def _frame(self, e: Frame, new: dict[str, Any]) -> None:
+        if isinstance(e, Road) and self.place.mirror and (e.surface is not None or self.place.mirror == "z"):
+            self.refuse(e, "a road has no mirror image here; leave it out, and add it to the whole mechanism")
         if e.body != GROUND:
             new["position"] = self._local("position", new["position"])
             if self.planar:
@@ -432,6 +435,8 @@ class Subassembly:
                 coordinate = getattr(e, name)
                 if coordinate is not None and self.image(coordinate, e).sign < 0.0:
                     new[factor] = scaled(-1.0, self._value(e, new, factor))
+        if isinstance(e, TwoFrameForce) and e.on_bodies:
+            self._tyre(e, new)
         if isinstance(e, BodyForce):
             self._components(e, new)
         elif getattr(e, "orientation", "") != "" and e.at is not None and isinstance(e, TwoFrameForce):  # type: ignore[attr-defined]
@@ -439,6 +444,15 @@ class Subassembly:
                 new["angle"] = self.place.plane_angle(self._value(e, new, "angle"))
             else:
                 new["orientation"] = self.place.orientation(self._value(e, new, "orientation"))
+
+    def _tyre(self, e: Any, new: dict[str, Any]) -> None:
+        """Keep ground as the road of the whole; change the side of a mirrored tyre."""
+        if e.body_i == GROUND:
+            new["body_i"] = GROUND
+        if self.place.mirror == "y" and e.side is not None:
+            new["side"] = "left" if e.side == "right" else "right"
+        elif self.place.mirror == "y" and hasattr(e.model, "measured_right"):
+            self.refuse(e, f"{e.model.title} was measured on one side; give side='left' or 'right', which is mirrored")
 
     def _components(self, e: BodyForce, new: dict[str, Any]) -> None:
         """Transform forces and torques given by components."""

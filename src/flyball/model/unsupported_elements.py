@@ -81,11 +81,12 @@ def refuse_controllers(model: Model, analysis: str) -> None:
     ModelError
         If the mechanism has a controller.
     """
-    if model.controllers:
-        titles = ", ".join(e.title for e in model.controllers)
+    if parts := model.with_states():
+        titles = ", ".join(e.title for e in parts)
         raise ModelError(
-            f"{model.name!r} has {titles}, and {analysis} does not support controllers; simulate and linearize do. "
-            "Use a copy of the mechanism whose laws have formulas in their place"
+            f"{model.name!r} has {titles}, and {analysis} does not support controllers and forces with states; "
+            "simulate and linearize do (with drivers of all motions, simulate gives their efforts too). Use a copy of "
+            "the mechanism without them, or whose laws have formulas in their place"
         )
 
 
@@ -97,9 +98,10 @@ def refuse_switching_with_controllers(model: Model, analysis: str, instead: str)
     ModelError
         If the mechanism has both; ``instead`` is what can be done besides leaving out what switches.
     """
-    if model.controllers and holds_or_touches(model):
+    if model.with_states() and holds_or_touches(model):
+        titles = ", ".join(e.title for e in model.with_states()[:3])
         raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and {analysis} only one of the two; leave "
+            f"{model.name!r} has {titles} and parts that hold at times, and {analysis} supports one of the two; leave "
             f"what holds out, m.changed({{...: None}}), or {instead}"
         )
 

@@ -109,7 +109,7 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
             raise ModelError(
                 f"{e.title}: 'at' is given, and {type(e).__name__} has no placed(n, planar) for its frames"
             )
-        if isinstance(e, TwoFrameForce) and n.at is None:
+        if isinstance(e, TwoFrameForce) and n.at is None and not e.on_bodies:
             check_by_frames(model, e)
     elif isinstance(e, Initial):
         unit = model.unit(e.name, e)

@@ -40,6 +40,7 @@ from .energy_balance import (
     lag_warning,
 )
 from .motion_record import coordinate_records, measured_coordinate
+from .tyre_warnings import tyre_warnings
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -391,6 +392,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
         *_undetermined_force_warnings(result),
         *_creep_warnings(result),
         *transverse_slip_warnings(result),
+        *tyre_warnings(result),
         *singular_passage_warnings(result),
         lock_up_warning(result),
         *pull_warnings(result),

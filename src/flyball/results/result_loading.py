@@ -123,8 +123,8 @@ def _updated_model_text(model: str) -> str:
 
 
 def _rebuild_result(stored: dict[str, Any], cls: type[ModelType], where: str) -> Result:
+    from ..model.linked_files import paths_from
     from ..model.model_files import loads
-    from ..model.shapes.mesh import paths_from
     from ..tables.structure import Choices, structure
     from ..tables.values import values
 

@@ -320,7 +320,7 @@ class SensitivityOptions(DerivativeOptions):
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
-    if model.controllers:
+    if model.with_states():
         return _with_controllers(model, o)
     return _computed_sensitivity(model, o)
 
@@ -516,7 +516,7 @@ def _motion_function(a: DerivativeRequest) -> ParameterFunction:
 def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
     found = equilibrium(a.model, rest_options(a.t, a.parameters))
     b = found.assembly
-    if a.model.controllers:  # controller states are unknowns, too
+    if a.model.with_states():  # controller states are unknowns, too
         return _sensitivity_at_rest(a, determined_rest(b))
     if abs(found.least) < LEAST_STIFFNESS_RATIO:
         weak = ", ".join(found.weakest)

@@ -466,11 +466,13 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
                     f"{_law_texts(e)}"
                 )
             pressed = W.sensed.load[S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
-            out = (
-                e.effort(par, x, y, laws, pressed)
-                if isinstance(e, CoordinateForce)
-                else np.ravel(e.wrench_between(par, F, M, tuple(laws), (x, y), S.const))
-            )
+            if e.states():
+                own = tuple(c.z[S.forces.state[k] : S.forces.state[k] + 2])
+                out = np.ravel(e.wrench_and_rates(par, F, M, own, S.const, S.surfaces)[0])
+            elif isinstance(e, CoordinateForce):
+                out = e.effort(par, x, y, laws, pressed)
+            else:
+                out = np.ravel(e.wrench_between(par, F, M, tuple(laws), (x, y), S.const))
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"
     return ""

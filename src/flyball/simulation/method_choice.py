@@ -329,10 +329,10 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
     if o.method == AUTO_METHOD:
         return _choose_automatically(model, o)
     touch = bool(model.contacts or model.bulk)
-    if o.method == VARIATIONAL and model.controllers:
+    if o.method == VARIATIONAL and model.with_states():
         raise ModelError(
             f"method={o.method!r} is for conservative motions, and computes works with an error of second order; it "
-            f"does not support {model.controllers[0].title}: leave method out, or give method='radau'"
+            f"does not support {model.with_states()[0].title}: leave method out, or give method='radau'"
         )
     if not isinstance(o.method, Stepping) and o.method != IMPULSE_METHOD:
         if model.bulk:

@@ -231,7 +231,7 @@ def rest_options(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """Find a static equilibrium near the described position, or a steady motion: see `Mechanism.equilibrium`."""
-    if model.controllers:
+    if model.with_states():
         return _controlled_equilibrium(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
     _refuse_speeds(a)

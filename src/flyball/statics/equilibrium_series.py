@@ -63,7 +63,7 @@ class EquilibriaOptions(AnalysisOptions):
 def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
     """Compute equilibria over a parameter, each from the one before: see `Mechanism.equilibria`."""
     refuse_unsupported(model, "equilibria", controlled=True)
-    if model.controllers and o.stable:
+    if model.with_states() and o.stable:
         raise ModelError("stable= is for mechanisms without controllers; leave it out")
     points = checked_values(model, o.parameter, o.values, o.t or None, o.parameters)
     way = _SeriesBranch(model, o.parameter, o.t, dict(o.parameters or {}), o.stable)
@@ -73,13 +73,13 @@ def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
         for k, value in enumerate(points):
             before = len(way.jumps)
             try:
-                if k and model.controllers:
+                if k and model.with_states():
                     done.equilibria.append(
                         way.controlled(done.equilibria[-1], points[k - 1], value, CONTROLLED_HALVINGS)
                     )
                 elif x is None:
                     first = single(model, rest_options(*way.given(value), o.start, o.stable))
-                    x = None if model.controllers else way.rest(first)
+                    x = None if model.with_states() else way.rest(first)
                     done.equilibria.append(first)
                 else:
                     x = way.settled(way.follow(x, points[k - 1], value, MAX_HALVINGS), value)

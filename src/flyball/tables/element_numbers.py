@@ -127,7 +127,7 @@ def _with_needed_elements(model: Model, of: dict[str, SimpleNamespace]) -> dict[
     """The same numbers, with those of another element added for the forces that depend on it."""
     for e in model.forces:
         if name := e.needs():
-            of[e.name] = SimpleNamespace(**{**vars(of[e.name]), "of": of[name]})
+            of[e.name] = SimpleNamespace(**{**vars(of[e.name]), "of": of.get(name)})
     return of
 
 
@@ -149,7 +149,7 @@ def _parameters_of_elements(model: Model) -> dict[str, frozenset[str]]:
     found = {e.name: frozenset(names_in(e)) & model.parameters.keys() for e in model.elements()}
     for e in model.forces:
         if name := e.needs():
-            found[e.name] |= found[name]
+            found[e.name] |= found.get(name, frozenset())
     return {name: frozenset(used) for name, used in found.items() if used}
 
 

@@ -10,13 +10,15 @@ from ..compiler.kernels import CodeTable, code_table
 from ..constraints.blocks import DISTANCE, turning
 from ..errors import ModelError
 from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WRENCHES
+from ..forces.tyres.road_height import pack_curved, pack_straight
 from ..model.contact_point import Touch
 from ..model.controller import Controller, Sensor
-from ..model.element import LawOf, fields_with
+from ..model.element import LawOf, fields_with, resolve
 from ..model.event import Event
 from ..model.force import CoordinateForce, Force
 from ..model.names import curve_parts, is_curve
 from ..model.quantities import Curve, measured_quantity, transmitted_force
+from ..model.road import Road
 from .constraint_rows import coordinate_frames, coordinate_term, measured_term
 from .forest import coordinate_row
 from .structure_definition import Structure, frame_index
@@ -109,7 +111,7 @@ def fill_force_table(s: Structure) -> None:
     acting.sort(key=lambda x: FORCE_BY_ADDRESS if x[1] is not None else x[0].kind)
     s.forces, s.force_code = [f for f, _ in acting], [x for _, x in acting]
     none = np.full(len(s.forces), -1, np.int64)
-    table = Forces(none, none.copy(), np.full((len(s.forces), 3), -1, np.int64), *(none.copy() for _ in range(5)))
+    table = Forces(none, none.copy(), np.full((len(s.forces), 3), -1, np.int64), *(none.copy() for _ in range(6)))
     for k, e in enumerate(s.forces):
         table.kind[k] = e.kind if s.force_code[k] is None else FORCE_BY_ADDRESS
         table.family[k] = isinstance(e, CoordinateForce)
@@ -128,9 +130,26 @@ def fill_force_table(s: Structure) -> None:
         else:
             table.F[k], table.M[k] = frame_index(s, e, "F") if "F" in e.ends() else 0, frame_index(s, e, "M")
         _compile_laws(s, e, table.laws[k])
+        if states := e.states():
+            table.state[k] = s.state(f"{e.name}.{states[0]}")
         if not e.conservative():
             table.work[k] = s.state(f"{e.name}.work")
     s.tables["forces"] = table
+
+
+def fill_surfaces(s: Structure) -> None:
+    """Fill in the surfaces of the roads on which forces act."""
+    parts, roads = list[np.ndarray](), dict.fromkeys(e.ends()["F"] for e in s.forces if e.states())
+    for road in (r for name in roads if isinstance(r := s.model.find(name), Road)):
+        grid = road.grid(resolve(road, s.model.environment()))
+        if grid is not None:
+            s.surface_at[road.name] = sum(map(len, parts))
+            hold = road.beyond == "hold"
+            if grid.line is None:
+                parts.append(pack_straight(grid.heights, grid.along, grid.across, hold))
+            else:
+                parts.append(pack_curved(grid.heights, grid.along, grid.across, grid.line, hold))
+    s.surfaces = np.concatenate(parts) if parts else np.zeros(1)
 
 
 def place_rotors(s: Structure) -> None:

@@ -140,8 +140,8 @@ class _Centres:
 
     def _end(self, role: str, e: Any, centre: np.ndarray) -> np.ndarray:
         n, planar = self.numbers.of[e.name], self.model.planar
-        if not isinstance(e, (BodyForce, Body, Frame)) and n.at is not None:
-            return e.placed(n, planar)[role][0]
+        if not isinstance(e, (BodyForce, Body, Frame)) and n.at is not None and role in (placed := e.placed(n, planar)):
+            return placed[role][0]
         if isinstance(e, BodyForce) and isinstance(self.model[e.body], Body):
             at = getattr(n, "at", None)
             return centre if at is None else vector(at, planar, e.title)

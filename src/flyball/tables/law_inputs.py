@@ -29,7 +29,7 @@ from ..model.controller_signals import controller_states, input_law, signal_law
 from ..model.element import Element, LawOf, fields_with
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import Expression
-from ..model.force import CoordinateForce, Switch, TwoPointForce
+from ..model.force import CoordinateForce, Force, Switch, TwoPointForce
 from ..model.joint import Joint
 from ..model.model import Model
 from ..model.names import is_curve
@@ -69,6 +69,9 @@ def add_controller_laws(s: Structure) -> None:
     """Compile the laws of the rates of controller states."""
     laws, s.sampled, s.ordered = [], [], []
     for k, x in enumerate(s.controls):
+        if isinstance(x.controller, Force):
+            laws.append(-1)
+            continue
         at = s.law(x.law, (), None if x.controller.sampled else x.controller)
         laws.append(-1 if x.controller.sampled else at)
         if x.controller.sampled:
@@ -89,7 +92,7 @@ def add_gravity_laws(s: Structure) -> None:
 def initial_controller_states(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
     """Initial values of the controller states; ``numbers`` are those of elements, by name."""
     found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}
-    return [found[x.controller.name].get(x.state, 0.0) for x in s.controls]
+    return [found.get(x.controller.name, {}).get(x.state, 0.0) for x in s.controls]
 
 
 FORCE_READING_CODE = -2_000_000_000

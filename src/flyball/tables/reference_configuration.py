@@ -159,7 +159,8 @@ class Poses:
                 at = getattr(n, "at", None)
                 p = self.bodies[name].c if at is None else vector(at, self.model.planar, e.title)
             return p, R, name
-        p, R = self._placed(e, n)[f.role] if hasattr(e, "placed") and n.at is not None else self.named(end)
+        placed = self._placed(e, n) if hasattr(e, "placed") and n.at is not None else {}
+        p, R = placed[f.role] if f.role in placed else self.named(end)
         if f.coordinate:
             R = matrix_product(R, np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}")))
         return p, R, name

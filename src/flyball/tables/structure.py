@@ -274,6 +274,7 @@ def _built(model: Model, choices: Choices) -> Structure:
     if c.switches:
         constraint_rows.add_switch_rows(s)
     forces.fill_force_table(s)
+    forces.fill_surfaces(s)
     forces.place_rotors(s)
     law_inputs.add_controller_laws(s)
     law_inputs.add_gravity_laws(s)

@@ -115,6 +115,8 @@ class Structure:
     code: list[int] = field(default_factory=list)
     const: list[float] = field(default_factory=list)
     table_at: dict[str, int] = field(default_factory=dict)  # table or joint's curve -> its place in const
+    surfaces: np.ndarray = field(default_factory=lambda: np.zeros(1))  # `System.surfaces`
+    surface_at: dict[str, int] = field(default_factory=dict)  # road -> place of its surface
     laws: dict[int, str] = field(default_factory=dict)  # start of each law in the code -> description of the law
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1

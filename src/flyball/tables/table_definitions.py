@@ -158,6 +158,7 @@ class Forces(NamedTuple):
     kind: Int1
     family: Int1  # BETWEEN, ALONG, SLIDING
     switch: Int1  # its switch; -1: none
+    state: Int1  # its first state, among those of controllers; -1: none
 
 
 class Angles(NamedTuple):
@@ -281,7 +282,8 @@ class System(NamedTuple):
     kind_terms: Int1  # (TERM_KINDS + 1,): first term of each kind
     sizes: Sizes
     code: Int1  # bytecode of the laws
-    const: Number1  # parameters, literals of the laws, splines
+    const: Number1  # parameters, literals of the laws, splines, numbers of forces
+    surfaces: Float1  # surfaces of roads (`math.grid_spline`)
     gravity: Number1  # (3,) [m/s^2]; where a component is a law, its value at t = 0
     gravity_laws: Int1  # (4,): law of each component, -1: constant; state of the work of their changes, -1: none
     scales: Scales

@@ -177,7 +177,8 @@ def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Value
     )  # fmt: skip
     if any(a.tobytes() != b.tobytes() for a, b in same):
         return None
-    forces = _force_parameters(s, pose, curve_at, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
+    forces = refresh.table("force_parameters", S.force_parameters, dtype)
+    forces = _force_parameters(s, pose, curve_at, forces, refresh)
     of_switches = refresh.table("switch_numbers", S.switch_numbers, dtype)
     constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.frame_separation)
     S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
@@ -198,9 +199,8 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
     const, curve_at = _constants(s, numbers, env, dtype)
     terms = refresh.table("term_parameters", np.zeros((len(s.terms), 8), dtype), dtype)
     terms = _term_parameters(s, pose, holds, curve_at, terms, refresh)
-    forces = _force_parameters(
-        s, pose, curve_at, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
-    )
+    forces = refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype)
+    forces = _force_parameters(s, pose, curve_at, forces, refresh)
     if refresh.base is None and s.points and s.code_tables and dtype is float:
         check_point_formulas(s, pose, forces, terms, float(length))
     of_switches = refresh.table("switch_numbers", zero_table(SwitchNumbers, len(s.switches), dtype), dtype)
@@ -213,7 +213,7 @@ def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], ref
         **s.tables,
         bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
         force_code=table_addresses(s.force_code), term_code=table_addresses(s.term_code),
-        guard_code=table_addresses(s.guard_code), const=const,
+        guard_code=table_addresses(s.guard_code), const=const, surfaces=s.surfaces,
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
         velocity_units=_velocity_units(s, length, dtype),
@@ -357,7 +357,7 @@ def _longest_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
-    """Parameters, literals and tables of the laws, splines of joints and forces; and where those of each begin."""
+    """Parameters, literals and tables of the laws; splines of joints, data of forces, and where those of each begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
     curve_at = {}
@@ -367,6 +367,10 @@ def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: An
             curve_at[e.name] = len(const)
             for data in curves:
                 const += data
+    for force in s.forces:
+        if own := force.data(numbers[force.name]):
+            curve_at[force.name] = len(const)
+            const += own
     return np.array(const, dtype), curve_at
 
 
@@ -425,8 +429,11 @@ def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> 
     return t.sign * (share - _offset(t, pose.numbers))
 
 
+SURFACE_COLUMN, DATA_COLUMN = 14, 15  # of `System.force_parameters`: places of a force's road, and of its own numbers
+
+
 def _force_parameters(
-    s: Structure, pose: Poses, curve_at: Mapping[str, int], x: np.ndarray, refresh: Refresh
+    s: Structure, pose: Poses, data_at: Mapping[str, int], x: np.ndarray, refresh: Refresh
 ) -> np.ndarray:
     for k in refresh.rows(s, "forces"):
         e = s.forces[k]
@@ -434,6 +441,8 @@ def _force_parameters(
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")
         x[k], x[k, : len(par)] = 0.0, par
-        if e.name in curve_at:
-            x[k, 0] = curve_at[e.name]
+        if e.states():
+            x[k, SURFACE_COLUMN], x[k, DATA_COLUMN] = s.surface_at.get(e.ends()["F"], -1), data_at[e.name]
+        elif e.name in data_at:
+            x[k, 0] = data_at[e.name]
     return x

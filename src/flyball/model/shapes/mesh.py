@@ -5,44 +5,24 @@ from __future__ import annotations
 import difflib
 import os
 import reprlib
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator
 
 from ...errors import ModelError
 from ..element import Length, element, positive
+from ..linked_files import FilePath, LinkedFile
 from ..placement import Placement
 from .geometry import ConvexPart, Integrals, polyhedron_integrals, surface_defects, surface_part, weld_vertices
 from .solid import RESOLUTION, Solid
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 COLLADA = ".dae"
 MESH_FORMATS = (".stl", ".obj", ".ply", ".off", COLLADA)
-_FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
-
-
-@contextmanager
-def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
-    """Context manager: relative paths of meshes created inside are relative to this folder, not to the current one."""
-    token = _FOLDER.set(None if folder is None else Path(folder).absolute())
-    try:
-        yield
-    finally:
-        _FOLDER.reset(token)
-
-
-def current_folder() -> Path:
-    """Return the folder to which relative paths refer."""
-    return _FOLDER.get() or Path.cwd()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +62,8 @@ def number_rows(kind: type) -> Any:
     return BeforeValidator(convert, json_schema_input_type=tuple[tuple[kind, ...], ...])  # type: ignore[valid-type]
 
 
-def _text(value: Any) -> Any:
-    return Path(value).as_posix() if isinstance(value, os.PathLike) else value
-
-
 @element
-class Mesh(Solid):
+class Mesh(LinkedFile, Solid):
     """A solid given by its surface: triangles from a file, or vertices and faces.
 
     The surface must be closed and its triangles counter-clockwise seen from outside; then its volume, centre of mass
@@ -110,44 +86,18 @@ class Mesh(Solid):
         Only Collada files state their unit: they are read in metres.
     """
 
-    path: Annotated[str | None, BeforeValidator(_text)] = None
+    path: FilePath = None
     vertices: Annotated[Any, number_rows(float)] = field(default=None, repr=False)
     faces: Annotated[Any, number_rows(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
-    def __post_init__(self) -> None:
-        """Store the folder to which a relative path refers."""
-        object.__setattr__(self, "_folder", current_folder())
-
-    def _key(self) -> tuple:
-        return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
-
-    def __eq__(self, other: object) -> bool:
-        """Return whether all fields are equal; paths are equal if they lead to the same file."""
-        return self._key() == other._key() if isinstance(other, Mesh) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(self._key())
+    __eq__, __hash__ = LinkedFile.__eq__, LinkedFile.__hash__
 
     @property
     def title(self) -> str:
         """Return kind, and name or path if it has one, for messages."""
         name = self.name or self.path
         return f"Mesh {name!r}" if name else "Mesh"
-
-    @property
-    def file(self) -> str | None:
-        """Return the absolute path of the file."""
-        return self.path and os.path.normpath(os.path.join(self._folder, self.path))  # type: ignore[attr-defined]
-
-    def path_from(self, folder: str | os.PathLike) -> str | None:
-        """Return the path as a model file in that folder must contain it."""
-        if self.path is None or os.path.isabs(self.path) or os.path.normpath(Path(folder, self.path)) == self.file:
-            return self.path
-        try:
-            return Path(os.path.relpath(str(self.file), folder)).as_posix()
-        except ValueError:  # on another drive
-            return self.file
 
     def reflected(self, axis: str, orientation: Any) -> dict[str, Any]:
         """Return the reflected triangles, which then no longer come from a file."""

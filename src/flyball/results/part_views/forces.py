@@ -33,19 +33,33 @@ class ForceView(PartView):
         e, S = self.element, self._x.system
         k = self._index()
         F, M, par = self._frames
+        if e.states():
+            force, torque, rates = e.wrench_and_rates(par, F, M, self._states, S.const, S.surfaces)
+            return rates, force, torque
         a, b = (np.broadcast_to(i, (self._result.motions.n,)) for i in e.inputs(par, F, M))
         laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
         force, torque = e.wrench_between(par, F, M, laws, (a, b), S.const)
         return (a, b), force, torque
 
     @cached_property
-    def _figures(self) -> tuple:
-        """Return all outputs of a force between frames that computes them by a formula."""
+    def _figures(self) -> dict[str, np.ndarray]:
+        """Outputs of a force that computes them by a formula of its own."""
         F, M, par = self._frames
-        S, k = self._x.system, self._index()
-        a, b = self.element.inputs(par, F, M)
-        laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
-        return tuple(self.element.figures(par, F, M, laws, S.const))
+        e, S, n = self.element, self._x.system, len(self._result.t)
+        if e.states():
+            found = e.figures(par, F, M, self._states, S.const, S.surfaces)
+        else:
+            k = self._index()
+            a, b = e.inputs(par, F, M)
+            laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
+            found = e.figures(par, F, M, laws, S.const)
+        return {k: np.broadcast_to(x, (n,)) for k, x in zip(e.outputs, found, strict=True)}
+
+    @property
+    def _states(self) -> tuple[np.ndarray, np.ndarray]:
+        """The two states of a force over time."""
+        at = int(self._x.system.forces.state[self._index()])
+        return self._result.states[:, at], self._result.states[:, at + 1]
 
     @property
     def _frames(self) -> tuple[tuple, tuple, Any]:
@@ -245,6 +259,8 @@ class ForceView(PartView):
             return np.sqrt((pull * pull).sum(axis=1))
         if name not in outputs:
             return self._whole[name == "torque"]
+        if self.element.figures is not None:
+            return self._figures[name]
         k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
             value = self._whole_along[k]
@@ -252,8 +268,6 @@ class ForceView(PartView):
                 return np.abs(value) if name == "taut" else value
             seen = self.element.outward(self._x.numbers[self.element.name])
             return (self.element.sign if k == 2 else 1.0) * seen * value
-        if self.element.figures is not None:
-            return np.broadcast_to(self._figures[k], (self._result.motions.n,))
         inputs, force, _ = self._between()
         if k < 2:
             return inputs[k]

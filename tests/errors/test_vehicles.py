@@ -1,0 +1,85 @@
+"""Refusals of tyres and roads, each with its element, value and remedy."""
+
+import pytest
+
+import flyball as fb
+from tests.verification.published_tyres import MF61
+
+FIALA = {"radius": 0.3, "stiffness": 2e5, "nominal_load": 4e3, "slip_stiffness": 8e4, "cornering_stiffness": 6e4}
+
+
+def with_tyre(model=None, planar=False, road=None, **more):
+    m = fb.Mechanism("one wheel", gravity=(0, 0, -9.81) if not planar else (0, -9.81), planar=planar)
+    at = (0, 0.28) if planar else (0, 0, 0.28)
+    m.add(fb.Body("wheel", mass=400, inertia=10 if planar else (10, 20, 10), position=at))
+    m.add(*([road] if road else []))
+    m.add(fb.Tyre("t", "road" if road else "ground", "wheel", model=model or fb.FialaTyre(**FIALA), **more))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"planar": True}, "Tyre 't': a tyre is for spatial mechanisms"),
+        ({"axis": (0, 1, 0)}, "axis needs the wheel's centre"),
+        ({"points": 3}, "points is 3 and patch 0 m"),
+        ({"patch": 0.1}, "give one point without a patch"),
+        ({"side": "left"}, "FialaTyre is symmetric, so side has no effect"),
+        ({"low_speed": 0.0}, "low_speed is 0 m/s; it must be greater than 0"),
+        ({"model": fb.FialaTyre(**(FIALA | {"stiffness": -1.0}))}, "FialaTyre: stiffness is -1 N/m"),
+        ({"model": fb.FialaTyre(**FIALA, friction=0.0)}, "friction is 0; it must be greater"),
+        ({"model": fb.MagicFormula()}, "give the path of a tyre property file|UNLOADED_RADIUS"),
+        ({"model": fb.MagicFormula(coefficients={"PCX1": 1.0})}, "UNLOADED_RADIUS, FNOMIN.* missing"),
+        ({"model": fb.MagicFormula(coefficients=MF61 | {"PKX9": 1.0})}, "unknown coefficient 'PKX9'"),
+        ({"model": fb.MagicFormula(coefficients=MF61 | {"PKY1": 15.0})}, "PKY1 is 15; in the ISO axes"),
+        ({"model": fb.MagicFormula(path="nowhere.tir")}, "nowhere.tir cannot be read"),
+        ({"road": fb.Road("road", beyond="hold")}, "a plane has no edges"),
+        ({"road": fb.Road("road", friction=-0.5)}, "friction is -0.5; it must be greater than 0"),
+        ({"road": fb.Road("road", surface=fb.RandomRoad(roughness="Z", length=100))}, "give a class of ISO 8608"),
+        ({"road": fb.Road("road", surface=fb.RoadProfile(heights=[0.0], spacing=1.0))}, "two or more finite numbers"),
+        ({"road": fb.Road("road", surface=fb.OpenCRG(path="none.crg"))}, "none.crg cannot be read"),
+    ],
+)
+def test_refused(options, message):
+    with pytest.raises(fb.ModelError, match=message):
+        with_tyre(**options).assemble()
+
+
+def tir(tmp_path, text="", **changed):
+    lines = ["[UNITS]", "LENGTH = 'meter'", "[MODEL]", "FITTYP = 61 $version"]
+    lines += [f"{k} = {v} $comment" for k, v in (MF61 | changed).items()]
+    path = tmp_path / "tyre.tir"
+    path.write_text("\n".join(lines) + "\n" + text)
+    return path
+
+
+def test_files_of_tyres(tmp_path):
+    m = with_tyre(fb.MagicFormula(path=tir(tmp_path, "FZMIN = 100\nFZMAX = 3000\nKPUMIN = -1.5\nKPUMAX = 1.5\n")))
+    run = m.simulate(0.2)
+    assert any("load is" in x and "beyond the range 100 to 3000" in x for x in run.health.warnings)
+    m.save(tmp_path / "m.toml")
+    assert fb.load(tmp_path / "m.toml") == m
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("LENGTH = 'mm'\n", "LENGTH = 'mm'; only files in SI units"),
+        ("FITTYP = 2\n", "FITTYP = 2; it must be of the Magic Formula"),
+        ("PCX1 = abc\n", "PCX1 is 'abc', which is no number"),
+    ],
+)
+def test_wrong_files(tmp_path, text, message):
+    with pytest.raises(fb.ModelError, match=message):
+        with_tyre(fb.MagicFormula(path=tir(tmp_path, text))).assemble()
+
+
+def test_unknown_coefficients_of_a_file_are_named(tmp_path):
+    with pytest.warns(UserWarning, match="do not use: PKX7"):
+        with_tyre(fb.MagicFormula(path=tir(tmp_path, "PKX7 = 1.0\n"))).assemble()
+
+
+def test_inverse_dynamics_says_what_to_do():
+    m = with_tyre()
+    with pytest.raises(fb.ModelError, match=r"Tyre 't', and inverse_dynamics does not support.*forces with states"):
+        m.inverse_dynamics([0.0])
