@@ -100,20 +100,6 @@ def test_the_convex_form_floats_by_mu_times_the_slip():
     assert X.v[0, 2] == pytest.approx(mu * (X.v[0, 0] - 0.1 * X.v[0, 4]), rel=1e-9)
 
 
-def test_the_history_tells_every_sweep():
-    P, X, W, _, F = random_problem(3)
-    _, _, N, b = dense(P, X)
-    _, _, O, _ = allocate_solver(P, history=50)
-    assert O.count.history == 1
-    O.count.most, O.real.enough = 50, 0.0
-    solve_contacts(gauss_seidel, P, X, W, O, F)
-    p = impulses(P, X)
-    assert list(O.history[:, 0]) == list(range(1, 51))
-    assert O.history[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
-    assert O.history[-1, 3] == pytest.approx(0.5 * p @ N @ p + b @ p)
-    assert (np.diff(O.history[:, 3]) <= 1e-14).all()  # every visit is a descent in the convex form
-
-
 def test_a_least_impulse_is_held():
     P, X, W, O, F = random_problem(2, balls=True)
     P = P._replace(least=np.full(12, 0.7))

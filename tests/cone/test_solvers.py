@@ -272,20 +272,6 @@ def test_a_warm_start_is_used(name):
 
 
 @pytest.mark.parametrize("name", GRADIENTS)
-def test_the_history_tells_every_iteration(name):
-    P, X, W, _, F = random_problem(3)
-    _, _, N, b = dense(P, X)
-    _, _, O, _ = allocate_solver(P, history=40)
-    O.count.most, O.real.enough = 40, 0.0
-    solve_contacts(SOLVERS[name], P, X, W, O, F)
-    p = impulses(P, X)
-    rows = O.history[: O.count[5]]
-    assert rows[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
-    assert rows[-1, 3] == pytest.approx(0.5 * p @ N @ p + b @ p)
-    assert rows[-1, 1] < 0.5 * rows[0, 1]
-
-
-@pytest.mark.parametrize("name", GRADIENTS)
 def test_an_island_alone(name):
     P, X, W, O, F = random_problem(4, balls=True, nc=8, nn=6)
     P.at[:4] = [[-1, 0], [0, 1], [1, 2], [-1, 2]]

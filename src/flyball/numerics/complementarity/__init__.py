@@ -8,6 +8,7 @@ in place of cones). A new solver is a file with a kernel and a line in
 `solver_choice.SOLVERS`.
 
 The small dense problem (`dense_problem`, `dense_solver`) decides which rows stick, slide or separate.
+`solve_history` computes residuals over the iterations of any solver.
 `interior_point` and `douglas_rachford` find indeterminate forces within their cones.
 
 Imports: NumPy, `compiler/`, `math/`, `numerics/graphs`.

@@ -20,7 +20,7 @@ from .contact_problem import (
     FactorStorage,
     SolverSettings,
 )
-from .gradient_steps import apply_operator, apply_vector, begin_iterations, gradient_step, report_iterate, unused_index
+from .gradient_steps import apply_operator, apply_vector, begin_iterations, gradient_step, unused_index, write_result
 
 MAX_LIPSCHITZ = 1e30  # largest L; beyond it smaller steps gain nothing
 
@@ -45,8 +45,6 @@ def accelerated_gradient(P, X, W, O, first, way):
         rate = L * sqrt(worst)
         if least < 0.0 or rate < least:
             best, least = new, rate
-        if O.count.history:
-            report_iterate(P, X, W, O, many, best, used, False)
         if rate <= O.real.enough:
             O.count.ended = CONVERGED
             break
@@ -58,7 +56,7 @@ def accelerated_gradient(P, X, W, O, first, way):
         prev, cur, uprev, ucur = cur, new, ucur, unew
         new, unew = unused_index(cur, prev, best, 0), unused_index(ucur, uprev, 7, 4)
         L *= shrink
-    report_iterate(P, X, W, O, many, best, used, True)
+    write_result(P, X, W, O, many, best, used)
     return used
 
 

@@ -22,7 +22,7 @@ from .contact_problem import (
     FactorStorage,
     SolverSettings,
 )
-from .gradient_steps import TORQUE_OFFSET, apply_operator, begin_iterations, gradient_step, report_iterate, unused_index
+from .gradient_steps import TORQUE_OFFSET, apply_operator, begin_iterations, gradient_step, unused_index, write_result
 
 SUFFICIENT_DECREASE = 1e-4  # part of the decrease predicted by the slope
 MIN_STEP, MAX_STEP = 1e-3, 1e3  # bounds of the step; 1 is that of Gauss-Seidel
@@ -93,10 +93,8 @@ def barzilai_borwein(
         if least < 0.0 or rate < least:
             best, least = cur, rate
         cur, new, size = new, unused_index(new, best, new, 0), spectral_step(dd, curved, square, used % 2 == 1)
-        if O.count.history:
-            report_iterate(P, X, W, O, many, best, used, False)
         if least <= O.real.enough:
             O.count.ended = CONVERGED
             break
-    report_iterate(P, X, W, O, many, best, used, True)
+    write_result(P, X, W, O, many, best, used)
     return used

@@ -411,20 +411,13 @@ def accumulate_line_residuals(P, X, O, wide, free_wide, sofar):
 
 
 @formula
-def finish_solve(P, X, W, O, residual, used, last):
-    """Store the residuals of the impulses; after the last iteration, limit the impulses and write the solution.
+def finish_solve(P, X, W, O, residual):
+    """Store the residuals of the impulses after the last iteration, limit the impulses and write the solution.
 
     The impulses are in X, the velocities with them in W.node_state and X.wide, those without in X.v and W.free_wide;
     ``residual`` is the result of `residuals`.
     """
     velocity, force, linear, square = residual
-    row = O.count.written
-    if not last and row < O.history.shape[0]:
-        O.history.iteration[row], O.history.velocity[row] = used, velocity
-        O.history.force[row], O.history.objective[row] = force, 0.5 * square + linear
-        O.count.written = row + 1
-    if not last:
-        return
     O.real.residual, O.real.force_residual = velocity, force
     part = 1.0
     if not (velocity == velocity and square == square):

@@ -73,10 +73,8 @@ class SettingCounts(Record, kind="Int"):
 
     most: int  # maximum number of iterations (sweeps)
     island: int  # island to solve; -1: all
-    history: int  # whether the history is stored
     used: int  # iterations used
     ended: int  # CONVERGED, LIMIT_REACHED, STALLED, SOLVE_FAILED, STORAGE_TOO_SMALL
-    written: int  # rows written to the history
     coulomb: int  # 1: Coulomb's law by De Saxce's correction, 0: the convex form
     needed_numbers: int  # required sizes of `FactorStorage`
     needed_places: int
@@ -98,7 +96,6 @@ class SolverSettings(NamedTuple):
 
     count: SettingCounts  # type: ignore[assignment]
     real: SettingReals  # type: ignore[assignment]
-    history: SolveHistory
 
 
 class SphereContacts(Record, kind="Float", rows=True):
@@ -158,15 +155,6 @@ class LineLaws(Record, kind="Float", rows=True):
     soft: Column  # compliance
     lower: Column  # smallest impulse
     upper: Column
-
-
-class SolveHistory(Record, kind="Float", rows=True):
-    """Course of a solve."""
-
-    iteration: Column
-    velocity: Column  # residual
-    force: Column  # residual
-    objective: Column
 
 
 class Nodes(Record, kind="Float", rows=True):
@@ -256,15 +244,13 @@ def cache_aligned(rows: int, columns: int) -> np.ndarray:
 
 
 def allocate_solver(
-    P: ContactProblem, history: int = 0
+    P: ContactProblem,
 ) -> tuple[ContactSolution, ContactWorkspace, SolverSettings, FactorStorage]:
     """Allocate state, workspace, settings and an empty factor storage for a problem.
 
     Parameters
     ----------
     P : ContactProblem
-    history : int
-        Rows of the history of residuals; 0: no history.
 
     Returns
     -------
@@ -287,8 +273,8 @@ def allocate_solver(
         frictionless=cache_aligned(nc, FrictionlessContacts.layout.width).view(FrictionlessContacts),
         frictional=cache_aligned(nc, FrictionalContacts.layout.width).view(FrictionalContacts),
     )
-    O = SolverSettings(SettingCounts.blank(), SettingReals.blank(), SolveHistory.blank(history))
-    O.count[:3] = 100, -1, history > 0
+    O = SolverSettings(SettingCounts.blank(), SettingReals.blank())
+    O.count[:2] = 100, -1
     O.real[0] = 1e-6
     return X, W, O, FactorStorage(np.zeros(0), np.zeros(0, np.int64))
 

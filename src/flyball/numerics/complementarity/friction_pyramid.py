@@ -132,7 +132,7 @@ def pyramid(
     Coulomb's law on a pyramid of O.count.directions edges, at least three; without rolling friction. Otherwise it
     ends with `SOLVE_FAILED` and changes nothing.
     """
-    used, O.count.ended, O.count.written = 0, LIMIT_REACHED, 0
+    used, O.count.ended = 0, LIMIT_REACHED
     if P.turn.shape[0] > 0 or O.count.directions < 3 or not O.count.coulomb:
         O.count.ended, O.count.used = SOLVE_FAILED, 0
         return 0
@@ -145,11 +145,9 @@ def pyramid(
             worst = larger_or_nan(worst, update_pyramid(P, X, W, W.contact_nodes[s, 2], s, O.count.directions))
         worst = larger_or_nan(worst, sweep_lines(P, X, O, turned))
         used += 1
-        if O.count.history:
-            finish_solve(P, X, W, O, pyramid_residuals(P, X, W, O, worst), used, False)
         if worst <= O.real.enough:
             O.count.ended = CONVERGED
             break
     O.count.used = used
-    finish_solve(P, X, W, O, pyramid_residuals(P, X, W, O, worst), used, True)
+    finish_solve(P, X, W, O, pyramid_residuals(P, X, W, O, worst))
     return used

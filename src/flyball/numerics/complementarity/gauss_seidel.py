@@ -377,17 +377,14 @@ def gauss_seidel(
 ) -> int:
     """Sweep until velocities change by less than O.real.enough, at most O.count.most times; returns the sweeps."""
     many = prepare_sweeps(P, X, W, O)
-    used, O.count.ended, O.count.written = 0, LIMIT_REACHED, 0
+    used, O.count.ended = 0, LIMIT_REACHED
     while used < O.count.most:
         worst = sweep(P, X, W, O, many, used % 2 == 1)
         used += 1
-        if O.count.history:
-            unpack_impulses(P, X, W, many)
-            finish_solve(P, X, W, O, packed_residuals(P, X, W, O, many), used, False)
         if worst <= O.real.enough:
             O.count.ended = CONVERGED
             break
     O.count.used = used
     unpack_impulses(P, X, W, many)
-    finish_solve(P, X, W, O, packed_residuals(P, X, W, O, many), used, True)
+    finish_solve(P, X, W, O, packed_residuals(P, X, W, O, many))
     return used

@@ -398,7 +398,6 @@ def begin_iterations(P, X, W, O, unit_metric):
         apply_line_impulse(P, X.wide, k, X.line[k])
     subtract_free_velocities(P, X, W, O)
     apply_operator(P, X, W, O, many, (0, 0, 0, 0, 0), 4, 0.0)
-    O.count.written = 0
     return many
 
 
@@ -450,8 +449,8 @@ def subtract_free_velocities(P, X, W, O):
 
 
 @formula
-def report_iterate(P, X, W, O, many, best, used, last):
-    """Write the impulses of a vector to X, and their velocities; store a history row or, at last, the result."""
+def write_result(P, X, W, O, many, best, used):
+    """Write the impulses of a vector to X, their velocities, and the result of the solve."""
     first, end = node_range(P, O)
     for e in range(first, end):
         for k in range(6):
@@ -474,7 +473,7 @@ def report_iterate(P, X, W, O, many, best, used, last):
         X.line[k] = W.lines[best, k]
         apply_line_impulse(P, X.wide, k, X.line[k])
     O.count.used = used
-    finish_solve(P, X, W, O, residuals(P, X, O, (W.node_state, X.wide, W.free, W.free_wide)), used, last)
+    finish_solve(P, X, W, O, residuals(P, X, O, (W.node_state, X.wide, W.free, W.free_wide)))
 
 
 @formula

@@ -27,7 +27,7 @@ from .gradient_steps import (
     apply_operator,
     begin_iterations,
     gradient_step,
-    report_iterate,
+    write_result,
 )
 from .packed_contacts import SPHERE
 
@@ -97,10 +97,8 @@ def jacobi(
         _, _, worst = gradient_step(P, X, W, O, many, ids, (0.0, 1.0, O.count.coulomb))
         apply_operator(P, X, W, O, many, ids, 4 + new, 0.0)
         cur, new = new, cur
-        if O.count.history:
-            report_iterate(P, X, W, O, many, cur, used, False)
         if sqrt(worst) <= O.real.enough:
             O.count.ended = CONVERGED
             break
-    report_iterate(P, X, W, O, many, cur, used, True)
+    write_result(P, X, W, O, many, cur, used)
     return used

@@ -90,7 +90,6 @@ def solve_history(solver: str, P: ContactProblem, start: ContactSolution, settin
     """
     X, W, O, _ = allocate_solver(P)
     O.count[:], O.real[:] = settings.count, settings.real
-    O.count.history = 0
     prepared = prepare_solver(solver, P, X, W, O)
     rows = np.zeros((0, COLUMNS))
     most, most_steps = int(settings.count.most), int(settings.count.most_steps)  # of sweeps, and of Newton's method
