@@ -22,7 +22,15 @@ CONTACT = {  # see test_contact_examples
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
-ROBOTS = {"delta_robot.py", "five_bar.py", "hexapod_postures.py", "quadruped.py", "robot_arm_circle.py"}  # test_robots
+# test_robots, verification/test_seven_axes
+ROBOTS = {
+    "delta_robot.py",
+    "five_bar.py",
+    "hexapod_postures.py",
+    "quadruped.py",
+    "robot_arm_circle.py",
+    "seven_axes.py",
+}
 STANDS = {"inverted_pendulum.py"}  # until it is held, see test_inverted_pendulum
 FILES = [name for name in EVERY if name not in CONTACT | STANDS | ROBOTS]
 EVENTS = {  # see test_events: what holds in them changes at instants, or may
