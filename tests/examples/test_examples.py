@@ -63,6 +63,7 @@ PROMISED = {
     "clutch_start.toml",
     "differential.py",
     "double_wishbone.toml",
+    "excavator.py",
     "gear_backlash.toml",
     "geneva_drive.toml",
     "governor.toml",
