@@ -87,6 +87,7 @@ PROMISED = {
     "rolling_race.toml",
     "rope_pendulum.toml",
     "safety_brake.toml",
+    "schatz.py",
     "slider_crank.toml",
     "slider_crank_singularities.py",
     "spatial_four_bar.toml",
@@ -103,6 +104,7 @@ REDUNDANT = {
     "bricard.toml": 1,
     "differential.py": 1,
     "planetary.py": 2,
+    "schatz.py": 1,
     "geneva_drive.toml": 1,
 }  # rows that say nothing new, on purpose
 WAY = {"bogie.py": 0.01, "cam_follower.toml": 0.01}  # what moves least [m]

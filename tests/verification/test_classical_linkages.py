@@ -12,6 +12,7 @@ from tests.mechanisms import EXAMPLES, example
 
 LINKAGES = runpy.run_path(str(EXAMPLES / "linkages.py"))
 EXCAVATOR = runpy.run_path(str(EXAMPLES / "excavator.py"))
+SCHATZ = runpy.run_path(str(EXAMPLES / "schatz.py"))
 BENNETT = runpy.run_path(str(EXAMPLES / "bennett.py"))
 
 
@@ -136,3 +137,14 @@ def test_an_excavators_arm_follows_its_cylinders():
     work = CubicSpline(run.t, power).antiderivative()(run.t)
     energy = run.energy.kinetic + run.energy.potential
     np.testing.assert_allclose(work, energy - energy[0], atol=1e-4 * np.ptp(energy))
+
+
+def test_schatzs_linkage_moves_against_the_count_and_turns_round():
+    """cos(b) = sqrt(3)/2 cos(a) of the first two hinge angles, which are measured as in its figure."""
+    m, drawn = SCHATZ["mechanism"](), SCHATZ["drawn"]()
+    free = m.changed({"motor": None}).mobility()
+    assert (free.freedoms, free.geometry.gruebler, free.redundancy) == (1, 0, 1)
+    run = m.kinematics(np.linspace(0, 4, 181))
+    first, second = drawn[0] + run["A.angle"], drawn[1] + run["B.angle"]
+    np.testing.assert_allclose(np.cos(second), np.sqrt(3) / 2 * np.cos(first), atol=1e-12)
+    assert abs(run["F.angle"][-1]) == pytest.approx(4 * np.pi, abs=1e-10)  # the other shaft turns as often
