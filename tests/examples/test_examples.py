@@ -22,7 +22,15 @@ CONTACT = {  # see test_contact_examples
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
-ROBOTS = {"delta_robot.py", "five_bar.py", "hexapod_postures.py", "quadruped.py", "robot_arm_circle.py"}  # test_robots
+# test_robots, verification/test_seven_axes
+ROBOTS = {
+    "delta_robot.py",
+    "five_bar.py",
+    "hexapod_postures.py",
+    "quadruped.py",
+    "robot_arm_circle.py",
+    "seven_axes.py",
+}
 STANDS = {"inverted_pendulum.py"}  # until it is held, see test_inverted_pendulum
 FILES = [name for name in EVERY if name not in CONTACT | STANDS | ROBOTS]
 EVENTS = {  # see test_events: what holds in them changes at instants, or may
@@ -57,6 +65,7 @@ PROMISED = {
     "clutch_start.toml",
     "differential.py",
     "double_wishbone.toml",
+    "excavator.py",
     "gear_backlash.toml",
     "geneva_drive.toml",
     "governor.toml",
@@ -80,6 +89,7 @@ PROMISED = {
     "rolling_race.toml",
     "rope_pendulum.toml",
     "safety_brake.toml",
+    "schatz.py",
     "slider_crank.toml",
     "slider_crank_singularities.py",
     "spatial_four_bar.toml",
@@ -97,6 +107,7 @@ REDUNDANT = {
     "bricard.toml": 1,
     "differential.py": 1,
     "planetary.py": 2,
+    "schatz.py": 1,
     "geneva_drive.toml": 1,
 }  # rows that say nothing new, on purpose
 WAY = {"bogie.py": 0.01, "cam_follower.toml": 0.01}  # what moves least [m]

@@ -6,10 +6,13 @@ import runpy
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from tests.mechanisms import EXAMPLES, example
 
 LINKAGES = runpy.run_path(str(EXAMPLES / "linkages.py"))
+EXCAVATOR = runpy.run_path(str(EXAMPLES / "excavator.py"))
+SCHATZ = runpy.run_path(str(EXAMPLES / "schatz.py"))
 BENNETT = runpy.run_path(str(EXAMPLES / "bennett.py"))
 
 
@@ -109,3 +112,39 @@ def test_bennetts_linkage_moves_against_the_count():
     np.testing.assert_allclose(sines, ratio * cosines, atol=1e-12)
     np.testing.assert_allclose(run["C.angle"], -run["A.angle"], atol=1e-12)
     np.testing.assert_allclose(run["D.angle"], -run["B.angle"], atol=1e-12)
+
+
+def test_an_excavators_arm_follows_its_cylinders():
+    """One triangle after the other: boom, arm, rocker, bucket; the cylinders do the work of the motion."""
+    m = EXCAVATOR["mechanism"]()
+    assert m.mobility().freedoms == 0
+    run = m.kinematics(np.linspace(0, EXCAVATOR["PERIOD"], 81))
+    P = {name: complex(*xy) for name, xy in EXCAVATOR["POINTS"].items()}
+    length = {name: run[f"{name} cylinder.length"] for name in EXCAVATOR["CYLINDERS"]}
+
+    p1 = third(P["A"], P["c1"], abs(P["p1"] - P["A"]), length["boom"], 1)
+    boom = (p1 - P["A"]) / (P["p1"] - P["A"])
+    B, c2 = (P["A"] + boom * (P[x] - P["A"]) for x in ("B", "c2"))
+    p2 = third(B, c2, abs(P["p2"] - P["B"]), length["arm"], -1)
+    arm = (p2 - B) / (P["p2"] - P["B"])
+    c3, D, E = (B + arm * (P[x] - P["B"]) for x in ("c3", "D", "E"))
+    F = third(E, c3, abs(P["F"] - P["E"]), length["bucket"], -1)
+    G = third(F, D, abs(P["G"] - P["F"]), abs(P["G"] - P["D"]), 1)
+    T = D + (G - D) / (P["G"] - P["D"]) * (P["T"] - P["D"])
+    for name, point in (("boom p1", p1), ("arm p2", p2), ("rocker F", F), ("link G", G), ("bucket T", T)):
+        np.testing.assert_allclose(run[name].position @ [1, 1j], point, atol=1e-11)
+    power = sum(run[f"{name} cylinder_drive.effort"] * run[f"{name} cylinder.length_rate"] for name in length)
+    work = CubicSpline(run.t, power).antiderivative()(run.t)
+    energy = run.energy.kinetic + run.energy.potential
+    np.testing.assert_allclose(work, energy - energy[0], atol=1e-4 * np.ptp(energy))
+
+
+def test_schatzs_linkage_moves_against_the_count_and_turns_round():
+    """cos(b) = sqrt(3)/2 cos(a) of the first two hinge angles, which are measured as in its figure."""
+    m, drawn = SCHATZ["mechanism"](), SCHATZ["drawn"]()
+    free = m.changed({"motor": None}).mobility()
+    assert (free.freedoms, free.geometry.gruebler, free.redundancy) == (1, 0, 1)
+    run = m.kinematics(np.linspace(0, 4, 181))
+    first, second = drawn[0] + run["A.angle"], drawn[1] + run["B.angle"]
+    np.testing.assert_allclose(np.cos(second), np.sqrt(3) / 2 * np.cos(first), atol=1e-12)
+    assert abs(run["F.angle"][-1]) == pytest.approx(4 * np.pi, abs=1e-10)  # the other shaft turns as often
