@@ -52,6 +52,7 @@ LAYERS = (  # from the foundation up: a package imports, when it is imported, on
     "live",
     "mechanism_methods",
     "mechanism cli",
+    "vehicles",
     "testing __init__ __main__",
 )
 LAYER = {name: k for k, line in enumerate(LAYERS) for name in line.split()}
