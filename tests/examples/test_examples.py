@@ -18,6 +18,7 @@ CONTACT = {  # see test_contact_examples
     "pile_in_a_box.py",
     "rocking_block.toml",  # and test_events
     "tippe_top.py",
+    "tracked_vehicle.py",  # verification/test_tracks
     "wrecking_ball.py",
 }
 ROBOTS = {"delta_robot.py", "five_bar.py", "hexapod_postures.py", "quadruped.py", "robot_arm_circle.py"}  # test_robots

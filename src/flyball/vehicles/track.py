@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin, tan
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -88,6 +89,7 @@ def track(
     mass: float,
     width: float = 0.3,
     friction: float = 0.3,
+    damping: float = 0.0,
 ) -> Mechanism:
     """Return a track in the plane: shoes, hinged to a closed chain, around wheels on a hull.
 
@@ -112,6 +114,8 @@ def track(
         Of a shoe.
     friction : number [1]
         Between shoes and wheels.
+    damping : number [N m s/rad]
+        Of the hinges, where not zero: by ``pin_0_damper``, ...; it calms the free runs.
 
     Raises
     ------
@@ -130,8 +134,10 @@ def track(
         nearest = pins[np.argmin(abs(np.hypot(*(pins - at).T) - hypot(r + thickness / 2, pitch / 2)))] - at
         teeth = () if w.teeth is None else tooth_shapes(w.teeth, atan2(*nearest[::-1]), pitch, thickness, width)
         add_wheel(m, w, at, r, (Cylinder(radius=r, length=width), *teeth))
-    plates = [f"shoe_{k}" for k in range(shoes)]
-    m.add(Contact("wheel_contact", between=plates, others=[w.name for w in wheels], friction=friction))
+    if damping:
+        m.add(*(TorsionalSpringDamper(f"pin_{k}_damper", f"pin_{k}", damping=damping) for k in range(shoes)))
+    plates = tuple(f"shoe_{k}" for k in range(shoes))
+    m.add(Contact("wheel_contact", between=plates, others=tuple(w.name for w in wheels), friction=friction))
     return m
 
 
@@ -181,7 +187,9 @@ def closed_chain(
         centres[idler] = (centres[idler][0] + x * unit[0], centres[idler][1] + x * unit[1])
         arcs = taut_band(centres, radii)
         driven = next((k for k, a in enumerate(arcs) if wheels[a.circle].teeth is not None), 0)
-        start = sum(a.length for a in arcs[:driven]) + arcs[driven].radius * (arcs[driven].last - arcs[driven].first) / 2
+        start = (
+            sum(a.length for a in arcs[:driven]) + arcs[driven].radius * (arcs[driven].last - arcs[driven].first) / 2
+        )
         return chords(arcs, start, pitch, shoes)
 
     reach = 0.75 * pitch
@@ -189,8 +197,8 @@ def closed_chain(
     if not inner > 0 > outer:
         needed = shoes - round(chain(0.0)[1] / pitch)
         raise ModelError(
-            f"track {name!r}: {shoes} shoes do not fit around its wheels; with the idler {wheels[idler].name!r} near its "
-            f"place it has {needed}: give shoes={needed}, or move the idler"
+            f"track {name!r}: {shoes} shoes do not fit around its wheels; with the idler {wheels[idler].name!r} near "
+            f"its place it has {needed}: give shoes={needed}, or move the idler"
         )
     x = brentq(lambda x: chain(x)[1], -reach, reach, xtol=1e-13)
     return (x * unit[0], x * unit[1]), chain(x)[0]
@@ -226,16 +234,16 @@ def add_shoes(m: Mechanism, pins: np.ndarray, pitch: float, thickness: float, ma
         angle = atan2(b[1] - a[1], b[0] - a[0])
         plate = Box(edges=((1 - GAP) * pitch, thickness, width))
         hinge = Rod(start=(-pitch / 2, 0, -width / 2), end=(-pitch / 2, 0, width / 2), radius=thickness / 4, looks=True)
-        place = {"position": tuple((a + b) / 2), "angle": angle}
-        m.add(Body(f"shoe_{k}", mass=mass, shape=(plate, hinge), color=STEEL, **place))
+        middle = tuple(((a + b) / 2).tolist())
+        m.add(Body(f"shoe_{k}", mass=mass, shape=(plate, hinge), color=STEEL, position=middle, angle=angle))
     for k, p in enumerate(pins):
-        m.add(Revolute(f"pin_{k}", f"shoe_{(k - 1) % number}", f"shoe_{k}", at=tuple(p)))
+        m.add(Revolute(f"pin_{k}", f"shoe_{(k - 1) % number}", f"shoe_{k}", at=tuple(p.tolist())))
 
 
 def add_wheel(m: Mechanism, w: TrackWheel, at: tuple[float, float], radius: float, shape: tuple) -> None:
     """Add a wheel with what carries it."""
     m.add(Body(w.name, mass=w.mass, inertia=w.mass * radius**2 / 2, position=at, shape=shape, color=SLATE))
-    n, carrier, hub = w.name, "ground", 0.3 * radius
+    n, carrier, hub, stiffness = w.name, "ground", 0.3 * radius, w.stiffness or 0.0
     if w.arm is not None:
         carrier = f"{n}_arm"
         lever = (w.arm[0] - at[0], w.arm[1] - at[1])
@@ -244,14 +252,14 @@ def add_wheel(m: Mechanism, w: TrackWheel, at: tuple[float, float], radius: floa
         rod = Rod(start=(-lever[0] / 2, -lever[1] / 2), end=(lever[0] / 2, lever[1] / 2), radius=hub / 2, looks=True)
         m.add(Body(carrier, mass=mass, inertia=mass * span**2 / 12, position=middle, shape=rod, color=RUST))
         m.add(Revolute(f"{n}_pivot", "ground", carrier, at=w.arm))
-        free = lever[0] * w.load / w.stiffness
-        m.add(TorsionalSpringDamper(f"{n}_bar", f"{n}_pivot", stiffness=w.stiffness, damping=w.damping, angle=free))
+        free = lever[0] * w.load / stiffness
+        m.add(TorsionalSpringDamper(f"{n}_bar", f"{n}_pivot", stiffness=stiffness, damping=w.damping, angle=free))
     elif w.slide is not None:
         carrier = f"{n}_slider"
         mass = ARM * w.mass
         block = Box(edges=(hub, hub, hub), looks=True)
         m.add(Body(carrier, mass=mass, inertia=mass * hub**2 / 6, position=at, shape=block, color=RUST))
         m.add(Prismatic(f"{n}_slide", "ground", carrier, at=at, axis=w.slide))
-        spring = {"stiffness": w.stiffness, "damping": w.damping, "rest": w.load / w.stiffness}
+        spring: Any = {"stiffness": stiffness, "damping": w.damping, "rest": w.load / stiffness}
         m.add(CoordinateSpring(f"{n}_spring", f"{n}_slide.displacement", **spring))
     m.add(Revolute(f"{n}_axle", carrier, n, at=at))
