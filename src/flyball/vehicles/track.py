@@ -120,7 +120,7 @@ def track(
     Raises
     ------
     ModelError
-        If the number of shoes does not fit around the wheels with the idler within half a pitch of its place; if there
+        If the number of shoes does not fit around the wheels with the idler within three quarters of a pitch of its place; if there
         is not exactly one idler; if two wheels have one name.
     """
     check_track(name, wheels, shoes=shoes, pitch=pitch, thickness=thickness, mass=mass, width=width)
