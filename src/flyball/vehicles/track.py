@@ -120,8 +120,8 @@ def track(
     Raises
     ------
     ModelError
-        If the number of shoes does not fit around the wheels with the idler within three quarters of a pitch of its place; if there
-        is not exactly one idler; if two wheels have one name.
+        If the number of shoes does not fit around the wheels with the idler within three quarters of a pitch of its
+        place; if there is not exactly one idler; if two wheels have one name.
     """
     check_track(name, wheels, shoes=shoes, pitch=pitch, thickness=thickness, mass=mass, width=width)
     idler = next(k for k, w in enumerate(wheels) if w.slide is not None)
