@@ -51,6 +51,7 @@ PAGES = {  # name of the page: title, introduction
         "Controllers",
         "They have states and signals that laws name. See [controllers](../controllers.md).",
     ),
+    "vehicles": ("Vehicles", "Running gear by one call. See [tracked vehicles](../tracks.md)."),
     "shapes": (
         "Shapes",
         "Shapes give bodies their mass properties, collision geometry and look. Every shape takes the arguments of the "
@@ -94,6 +95,7 @@ _BY_MODULE = {  # the beginning of a module's name: page
     "flyball.joints": "joints",
     "flyball.controllers": "controllers",
     "flyball.results": "results",
+    "flyball.vehicles": "vehicles",
     "flyball.assembly": "results",
     "flyball.symbolic": "equations",
     "flyball.errors": "errors",

@@ -77,7 +77,7 @@ USES = {
     "PointTorque": 'fb.PointTorque("drive", "wheel", torque=5)',
     "Rope": 'fb.Rope("rope", ("ground", "load"), at=((0, 2), (0, 0)), stiffness="2e5 N/m", damping="200 N*s/m")',
     "Rubber": (
-        'fb.Rubber("mount", "guide.displacement", stiffness="1e5 N/m", viscous_stiffness=("4e4 N/m",), '
+        'fb.Rubber("mount", "slide.displacement", stiffness="1e5 N/m", viscous_stiffness=("4e4 N/m",), '
         'relaxation_times=("10 ms",), friction="50 N", friction_travel="0.4 mm")'
     ),
     "SpringDamper": (

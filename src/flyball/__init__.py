@@ -28,6 +28,7 @@ Describe a mechanism
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,
                   Table2D a surface
     Sensor, IMU   measured quantities with names of their own
+    vehicles      track: shoes around a sprocket with teeth, idler, road wheels on torsion bars; TrackWheel
     load          read a mechanism from a TOML or Python file, a robot in urdf; ``m.save(path)`` writes one
 
 Look before you run
@@ -189,6 +190,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .symbolic.linear.linear_equations import LinearEquations as LinearEquations
     from .symbolic.linear.stability_conditions import StabilityConditions as StabilityConditions
     from .symbolic.linear.transfer_functions import TransferFunction as TransferFunction
+    from .vehicles.track import TrackWheel as TrackWheel
+    from .vehicles.track import track as track
 
 __version__ = "0.4.0"
 
@@ -229,6 +232,8 @@ _HOME = {
     "StartWarning": "errors",
     "load_result": "mechanism",
     "load_study": "studies.study",
+    "track": "vehicles.track",
+    "TrackWheel": "vehicles.track",
     "Result": "results.result",
     "FlyballError": "errors",
     "ModelError": "errors",

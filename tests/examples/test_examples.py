@@ -19,6 +19,7 @@ CONTACT = {  # see test_contact_examples
     "rocking_block.toml",  # and test_events
     "silo.py",  # and verification/test_silo
     "tippe_top.py",
+    "tracked_vehicle.py",  # verification/test_tracks
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }

@@ -52,6 +52,7 @@ LAYERS = (  # from the foundation up: a package imports, when it is imported, on
     "live",
     "mechanism_methods",
     "mechanism cli",
+    "vehicles",
     "testing __init__ __main__",
 )
 LAYER = {name: k for k, line in enumerate(LAYERS) for name in line.split()}
@@ -242,7 +243,7 @@ def test_compiled_code_is_made_of_stamped_files():
 
 
 def test_only_dispatch_lists_kinds():
-    """Elements are found by registry: no other file names one but readers of formats, and the live page, which add some."""
+    """Elements are found by registry: no other file names one but formats, vehicles and the live page, which add some."""
     names = {c.__name__ for c in fb.Body.registry.values() if c.category in ("joints", "forces")}
     names = {n for n in names if Element.registry[n].__module__.startswith(("flyball.joints.", "flyball.forces."))}
     for path in FILES:
@@ -255,6 +256,7 @@ def test_only_dispatch_lists_kinds():
                 "model",
                 "elements",
                 "robots",
+                "vehicles",
                 "testing",
                 "view",
                 "live",
