@@ -81,5 +81,7 @@ def test_unknown_coefficients_of_a_file_are_named(tmp_path):
 
 def test_inverse_dynamics_says_what_to_do():
     m = with_tyre()
-    with pytest.raises(fb.ModelError, match=r"Tyre 'rubber', and inverse_dynamics does not support.*forces with states"):
+    with pytest.raises(
+        fb.ModelError, match=r"Tyre 'rubber', and inverse_dynamics does not support.*forces with states"
+    ):
         m.inverse_dynamics([0.0])
