@@ -24,10 +24,10 @@ AXLES = {"front": 2.4, "rear": -2.0}  # places along the frame [m]
 
 def ramp(spacing: float = 0.05) -> fb.RoadProfile:
     """A ramp up and down from x = 10 m to 18 m, rounded as the tyres would round it."""
-    x = np.arange(-20.0, 120.0, spacing)
+    x = np.arange(-10.0, 60.0, spacing)
     up, down = (np.clip((x - at) / 3.0, 0.0, 1.0) for at in (10.0, 15.0))
     rise = [s**3 * (10.0 - 15.0 * s + 6.0 * s**2) for s in (up, down)]
-    return fb.RoadProfile(heights=RAMP * (rise[0] - rise[1]), spacing=spacing, start=-20.0, width=20.0)
+    return fb.RoadProfile(heights=RAMP * (rise[0] - rise[1]), spacing=spacing, start=-10.0, width=20.0)
 
 
 def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 8.0, lane: float = 0.0) -> fb.Mechanism:

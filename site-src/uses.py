@@ -60,7 +60,10 @@ USES = {
     "Detent": 'fb.Detent("notches", "A.angle", pitch="30 deg", holding="2 N*m")',
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
-    "Tyre": 'fb.Tyre("tyre", "road", "front left", model=fb.MagicFormula(path="205_60R15.tir"), side="left")',
+    "Tyre": (
+        'fb.Tyre("tyre", "ground", "a", at=(0, 0, 0.3), model=fb.LinearTyre(radius=0.3, stiffness=2e5, '
+        "nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4))"
+    ),
     "LinearTyre": (
         "fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)"
     ),

@@ -13,14 +13,14 @@ def with_tyre(model=None, planar=False, road=None, **more):
     at = (0, 0.28) if planar else (0, 0, 0.28)
     m.add(fb.Body("wheel", mass=400, inertia=10 if planar else (10, 20, 10), position=at))
     m.add(*([road] if road else []))
-    m.add(fb.Tyre("t", "road" if road else "ground", "wheel", model=model or fb.FialaTyre(**FIALA), **more))
+    m.add(fb.Tyre("rubber", "road" if road else "ground", "wheel", model=model or fb.FialaTyre(**FIALA), **more))
     return m
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"planar": True}, "Tyre 't': a tyre is for spatial mechanisms"),
+        ({"planar": True}, "Tyre 'rubber': a tyre is for spatial mechanisms"),
         ({"axis": (0, 1, 0)}, "axis needs the wheel's centre"),
         ({"points": 3}, "points is 3 and patch 0 m"),
         ({"patch": 0.1}, "give one point without a patch"),
@@ -81,5 +81,7 @@ def test_unknown_coefficients_of_a_file_are_named(tmp_path):
 
 def test_inverse_dynamics_says_what_to_do():
     m = with_tyre()
-    with pytest.raises(fb.ModelError, match=r"Tyre 't', and inverse_dynamics does not support.*forces with states"):
+    with pytest.raises(
+        fb.ModelError, match=r"Tyre 'rubber', and inverse_dynamics does not support.*forces with states"
+    ):
         m.inverse_dynamics([0.0])

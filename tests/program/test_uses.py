@@ -9,6 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.model.element import Element
+from flyball.model.road import RoadSurface
 from flyball.model.shapes import Solid
 from flyball.rotations import from_axis_angle, matrix
 from tests.pages import ROOT
@@ -54,6 +55,10 @@ def test_a_line_makes_what_it_says(name):
         wrapped = fb.Ground if name in ("Plane", "HeightField") else fb.Body
         m = fb.Mechanism("shape")
         m.add(wrapped("b", shape=e, **({"density": 1000} if wrapped is fb.Body else {})))
+    elif e.category == "tyre models" if isinstance(e, Element) else False:
+        assert e.kind >= 0
+    elif isinstance(e, RoadSurface):
+        assert fb.Road("road", surface=e).surface == e
     elif name not in ("Impulse", "Lock", "Note", "Release", "Set", "Stop"):
         refused = []
         for planar in (True, False):

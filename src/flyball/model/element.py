@@ -440,7 +440,7 @@ def described_part(base: type[Element] | tuple[type[Element], ...], example: str
     def convert(value: Any) -> Any:
         if isinstance(value, Mapping):
             kind = value.get("type")
-            known = [k for k, c in Element.registry.items() if issubclass(c, base) and "check" in vars(c)]
+            known = [k for k, c in Element.registry.items() if issubclass(c, base) and "__signature__" in vars(c)]
             if kind is not None:
                 _registered(str(kind))
             if kind not in known:

@@ -23,6 +23,8 @@ from .element import Element, Flag, Number, Numbers, Unit, fields_with
 from .event import Action
 from .model import Model
 from .model_files import DEFAULT_KINDS, FEW_KINDS, MANY_KINDS, ONE_KIND, element_types
+from .opencrg import OpenCRG as OpenCRG
+from .random_road import RandomRoad as RandomRoad
 from .shapes import SHAPES, SURFACES
 from .shapes.solid import Solid
 from .snapshot import CATEGORIES
@@ -125,10 +127,22 @@ def _definitions() -> dict[str, Any]:
         found |= {name: _table_schema(Element.registry[name], typed=True) for name in element_types(category)}
     shapes = {c.__name__: c for c in (*SHAPES, *SURFACES)}
     shapes |= {k: c for k, c in Element.registry.items() if issubclass(c, Solid) and _is_own(c)}
-    for base, members in ((Solid, shapes), (Action, Action.registry)):
+    several: list[tuple[Any, Mapping[str, Any]]] = [(Solid, shapes), (Action, Action.registry)]
+    for base, members in (*several, *(_values_of_fields(category) for category in VALUE_CATEGORIES)):
         found |= {name: _table_schema(c, typed=True) for name, c in members.items()}
         found[base.__name__] = {"description": first_doc_line(base)} | _selected_by_type(sorted(members))
     return dict(sorted(found.items()))
+
+
+VALUE_CATEGORIES = ("road surfaces", "tyre models")
+"""Elements that are values of fields of others, each with its ``type``."""
+
+
+def _values_of_fields(category: str) -> tuple[type[Element], dict[str, type[Element]]]:
+    """Return the base class of a category, and the classes that a file may name."""
+    classes = [c for c in Element.registry.values() if c.category == category]
+    base = next(c for c in classes if Element in c.__bases__)
+    return base, {c.__name__: c for c in classes if "__signature__" in vars(c)}
 
 
 def _is_own(cls: type) -> bool:
@@ -148,7 +162,7 @@ def _table_schema(cls: type, typed: bool = False) -> dict[str, Any]:
     schema = _type_schema(cls)
     _describe(schema["properties"], cls)
     kind = {"type": {"description": first_doc_line(cls), "type": "string", "const": cls.__name__}}
-    if not issubclass(cls, (Solid, Action)):
+    if not issubclass(cls, (Solid, Action)) and getattr(cls, "category", "") not in VALUE_CATEGORIES:
         schema["properties"] |= {REPEAT: REPEAT_SCHEMA}
     return {
         "description": first_doc_line(cls),
