@@ -118,7 +118,7 @@ def everything():
         cornering_stiffness=15.0,
         trail=0.02,
     )
-    m.add(fb.Road("road", position=(0, 0, -1)), fb.Tyre("tyre", "road", "e", at=(2, 0.4, -0.3), model=tyre))
+    m.add(fb.Road("road", position=(0, 0, -1)), fb.Tyre("tyre", "road", "e", at=(2, 0.4, -0.6), model=tyre))
     return m
 
 

@@ -1,7 +1,7 @@
-"""Published coefficients of tyres, and the Magic Formula written down once more from the book.
+"""Coefficients of a tyre, and the Magic Formula written down once more from the book.
 
-``MF61``: passenger car tyre 205/60R15 V91, 2.2 bar (Pacejka, *Tire and Vehicle Dynamics*, 2012, appendix 3). ``PAC2002``:
-a tyre 245/40R18 with the coefficients that Adams and Chrono distribute.
+``MF61``: passenger car tyre 205/60R15 V91, 2.2 bar, after Pacejka, *Tire and Vehicle Dynamics*, 2012, appendix 3; some
+digits may differ from the print, which changes no test.
 """
 
 from math import atan, cos, exp, pi, sin, sqrt
