@@ -12,7 +12,7 @@ from ..model.controller import Sensor
 from ..model.element import Element, Number, Numbers, Unit, element, nonnegative
 from ..model.event import Event, Set
 from ..model.force import CoordinateForce
-from .coordinate_spring import CoordinateSpring
+from .coordinate_spring import CoordinateSpring, refuse_without_stiffness
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -87,6 +87,7 @@ class Rubber(CoordinateForce):
         if not self.name.isidentifier():
             raise ModelError(f"{self.title}: its parts occur in expressions; give it a name of one word")
         nonnegative(self, n, "stiffness", "friction")
+        refuse_without_stiffness(self, "rest", 0.0)
         if len(n.viscous_stiffness) != len(n.relaxation_times):
             raise ModelError(
                 f"{self.title}: {len(n.viscous_stiffness)} viscous_stiffness and {len(n.relaxation_times)} "

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from ..compiler.formulas import formula
 from ..errors import ModelError
-from ..math.scalar import choose, maximum, nonpositive, unless_zero
+from ..math.scalar import absolute, choose, maximum, nonpositive, unless_zero
 from ..math.vec import add, col, cross, dot, scale, sub
 from ..model.element import (
     Direction,
@@ -33,6 +33,7 @@ from ..model.geometry import vector
 from ..model.joint import WorldFrame
 from .rolling_contact import hertz, kalker_coefficients, kalker_table, packed_cubic, polach
 from .wheel_rail_geometry import (
+    APART,
     BEND,
     DAMPING,
     DATA,
@@ -40,6 +41,7 @@ from .wheel_rail_geometry import (
     LAST,
     MODULUS,
     PLACES_WIDTH,
+    RADIUS,
     RAIL_WIDTH,
     SAMPLES,
     SHEAR,
@@ -84,10 +86,11 @@ def rolling_speed(par, speed):
 
 
 @formula
-def contact_force(par, F, M, frame, axis, place, data):
+def contact_force(par, F, M, frame, axis, place, taken, data):
     """Return force on the wheel and its point from the wheel's centre in the world, and what curves show of it.
 
-    ``place`` is near its place on the wheel's profile, or beyond that if there is none.
+    ``place`` is near its place on the wheel's profile, or beyond that if there is none; ``taken`` is the place of
+    another contact, which counts once.
     """
     t, l, n, y, z = frame
     o = 0.0 * y
@@ -95,6 +98,8 @@ def contact_force(par, F, M, frame, axis, place, data):
     if nonpositive(choose(place - par[LAST], o - 1.0, greatest_depth(par, axis, (y, z), place, data))):
         return none
     s = refined_place(par, axis, (y, z), place, data)
+    if nonpositive(absolute(s - taken) - 0.5 * APART):
+        return none
     p, normal, forward, depth, (A, B) = contact_place(par, axis, (y, z), s, data)
     depth = choose(place - par[LAST], o - 1.0, depth)
     if nonpositive(depth):
@@ -145,16 +150,28 @@ def both_contacts(par, F, M, laws, data):
     a = scale(par[SIDE], col(M[1], 1))
     axis = (dot(a, t), dot(a, l), dot(a, n))
     one, other = near_places(par, axis, (frame[3], frame[4]), data)
-    first = contact_force(par, F, M, frame, axis, one, data)
-    second = contact_force(par, F, M, frame, axis, other, data)
+    first = contact_force(par, F, M, frame, axis, one, par[LAST] + APART + 0.0 * y, data)
+    taken = choose(first[2][0], first[2][8], par[LAST] + APART + 0.0 * y)
+    second = contact_force(par, F, M, frame, axis, other, taken, data)
     return first, second, frame
+
+
+@formula
+def derailed(par, M, frame):
+    """Return nan where the wheel is beside the rail by more than the search for contacts covers, else 0."""
+    _, l, n, y, z = frame
+    a = scale(par[SIDE], col(M[1], 1))
+    o = 0.0 * y
+    low = TRAVEL - (z - par[RADIUS])
+    return choose(low, choose(absolute(y + par[RADIUS] * dot(a, n)) - TRAVEL, math.nan + o, o), o)
 
 
 @formula
 def wrench(par, F, M, laws, values, data):
     """Return the force of both contacts on M, and their torque about its origin."""
-    (f, p, _), (g, q, _), _ = both_contacts(par, F, M, laws, data)
-    return add(f, g), add(cross(p, f), cross(q, g))
+    (f, p, _), (g, q, _), frame = both_contacts(par, F, M, laws, data)
+    lost = derailed(par, M, frame)
+    return add(add(f, g), (lost, lost, lost)), add(cross(p, f), cross(q, g))
 
 
 @formula
@@ -278,7 +295,8 @@ class WheelOnRail(TwoFrameForce):
         "outward_force": "N", "vertical_force": "N", "derailment_ratio": "1",
     }  # fmt: skip
     fails: ClassVar[str] = (
-        "Its contact has reached the end of the rail's profile. Give the profile more points, or end the motion before"
+        "Its contact has reached the end of the rail's profile, or the wheel is beside the rail by more than 30 mm. "
+        "Give the profile more points, or end the motion before"
     )
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:

@@ -49,8 +49,11 @@ def sampled_root_locus(done: RootLocus, points: np.ndarray, matrix: CycleMatrix,
         done.values, done.eigenvalues = points[: k + 1], np.array(rows)
         done.path_values, done.path = done.values, done.eigenvalues
         report(0.7 * (k + 1) / len(points), f"{value:.6g}")
-    for (a, w), (b, _) in pairwise(zip(points.tolist(), rows, strict=True)):
-        done.crossings += _crossings(matrix, a, b, w)
+    for a, b in pairwise(points.tolist()):
+        try:
+            done.crossings += _crossings(matrix, a, b)
+        except AnalysisError as error:
+            raise series_error(done, a, error) from error
     report(1.0, "")
     return done
 
@@ -62,7 +65,7 @@ def _continued(before: np.ndarray, w: np.ndarray) -> np.ndarray:
     return linear_sum_assignment(np.abs(before[:, None] - w))[1]
 
 
-def _crossings(matrix: CycleMatrix, a: float, b: float, w: np.ndarray) -> list[Crossing]:
+def _crossings(matrix: CycleMatrix, a: float, b: float) -> list[Crossing]:
     """Changes of stability between two values, by bisection to intervals in which one branch crosses the circle."""
     out = []
     waiting = [(a, b, 0)]
@@ -70,10 +73,10 @@ def _crossings(matrix: CycleMatrix, a: float, b: float, w: np.ndarray) -> list[C
         a, b, depth = waiting.pop()
         here, there = (np.linalg.eigvals(matrix(x)) for x in (a, b))
         change = int(outside_circle(there).sum()) - int(outside_circle(here).sum())
-        if change == 0:
-            continue
         on = _continued(here, there)
         moved = np.flatnonzero(outside_circle(here) != outside_circle(there[on]))
+        if not len(moved) or (change == 0 and depth == MAX_BISECTIONS):
+            continue
         alone = len(moved) == 1 or (len(moved) == 2 and _is_pair(here[moved]) and _is_pair(there[on][moved]))
         if alone or depth == MAX_BISECTIONS:
             out.append(_located(matrix, (a, b), here[moved[np.argmax(here[moved].imag)]], change))

@@ -32,8 +32,9 @@ class RandomRoad(RoadSurface):
     roughness : str or number [m^3]
         Class ``"A"`` (very good) to ``"H"`` (very poor), with the geometric mean of its range; or G_d(n0).
     length : number [m]
+        Length of the road, rounded to a multiple of the spacing; 91 m or more, the longest wave.
     spacing : number [m]
-        Of the heights along x.
+        Distance of the heights along x; 0.176 m at most.
     waviness : number
         Exponent w.
     seed : int
@@ -66,10 +67,15 @@ class RandomRoad(RoadSurface):
             )
         if not isinstance(self.roughness, str) and not self.roughness > 0.0:
             raise ModelError(f"{self.title}: roughness is {self.roughness:g} m^3; it must be greater than 0")
-        if not self.spacing > 0.0 or not self.length >= 2.0 / LEAST**0.5 or not 0.0 <= self.run_in <= self.length:
+        if not 0.0 < self.spacing <= 0.5 / MOST:
             raise ModelError(
-                f"{self.title}: length is {self.length:g} m, spacing {self.spacing:g} m and run_in {self.run_in:g} m; "
-                f"give a length of {2.0 / LEAST**0.5:.0f} m or more, a spacing greater than 0, and a run-in within it"
+                f"{self.title}: spacing is {self.spacing:g} m; it must be greater than 0, and {0.5 / MOST:.3f} m at "
+                f"most, so that two heights come on the shortest wave of the standard"
+            )
+        if not self.length >= 1.0 / LEAST or not 0.0 <= self.run_in <= self.length:
+            raise ModelError(
+                f"{self.title}: length is {self.length:g} m and run_in {self.run_in:g} m; give a length of "
+                f"{1.0 / LEAST:.0f} m or more, the longest wave of the standard, and a run-in within it"
             )
         if not 1.0 < self.waviness < 4.0:
             raise ModelError(f"{self.title}: waviness is {self.waviness:g}; it must be between 1 and 4, usually 2")

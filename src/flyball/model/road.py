@@ -15,6 +15,7 @@ from ..errors import ModelError
 from .body import GROUND, Frame
 from .element import Element, Number, Unit, described_part, element, positive, python_data, resolve
 from .shapes.height_field import HeightField
+from .units import split_quantity
 
 MOST_HEIGHTS = 50_000_000
 
@@ -68,7 +69,8 @@ class RoadProfile(RoadSurface):
     """A profile along x: one height for all of the width, or one for each wheel track.
 
     Heights are interpolated by a cubic spline with two continuous derivatives. Two tracks are at y = track / 2 (left)
-    and -track / 2 (right); between them the height changes evenly, beyond them it remains.
+    and -track / 2 (right). The height changes smoothly from one to the other in the middle half between them, and is
+    level across the road elsewhere, but for 1 % of the difference of the tracks.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ class RoadProfile(RoadSurface):
         return self.width if self.width is not None else 2.0 * self.track if self.track is not None else WIDTH
 
     def grid(self) -> RoadGrid:
-        """Return the profile across the width: 4 rows, or with two tracks rows at multiples of a quarter of these."""
+        """Return the profile across the width: 4 rows, or with two tracks `TRACK_CELLS` between them."""
         z = np.array(self.heights)
         if self.right is None or self.track is None:
             across = (-0.5 * self.wide, self.wide / 3.0)
@@ -126,12 +128,13 @@ class RoadProfile(RoadSurface):
         step = self.track / TRACK_CELLS
         half = int(np.ceil(0.5 * self.wide / step - 1e-9))
         y = step * np.arange(-half, half + 1)
-        share = np.clip(0.5 + y / self.track, 0.0, 1.0)
+        share = np.clip(0.5 + 2.0 * y / self.track, 0.0, 1.0)
+        share = share * share * (3.0 - 2.0 * share)
         heights = np.array(self.right)[:, None] * (1.0 - share) + z[:, None] * share
         return RoadGrid(heights, (self.start, self.spacing), (-half * step, step))
 
 
-TRACK_CELLS = 4  # between two tracks
+TRACK_CELLS = 12  # between two tracks
 WIDTH = 100.0  # m: of a road with one profile
 
 
@@ -170,6 +173,13 @@ class Road(Frame):
         positive(self, n, "friction")
         if self.surface is not None:
             self.surface.check(n.surface_numbers)
+            for name in ("dx", "dy"):
+                given = getattr(self.surface, name, None)
+                if isinstance(given, str) and split_quantity(given) is None:
+                    raise ModelError(
+                        f"{self.title}: {name} of its surface is {given!r}; the grid of a road does not follow "
+                        "parameters: give a number or a quantity"
+                    )
         elif self.beyond != "refuse":
             raise ModelError(f"{self.title}: a plane has no edges, so beyond has no effect; leave it out")
 

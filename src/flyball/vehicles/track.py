@@ -149,6 +149,8 @@ def check_track(name: str, wheels: Sequence[TrackWheel], **numbers: float) -> No
     names = [w.name for w in wheels]
     if twice := next((n for n in names if names.count(n) > 1), None):
         raise ModelError(f"track {name!r}: two wheels are named {twice!r}; give each a name of its own")
+    if flat := next((w for w in wheels if w.slide is not None and not hypot(*w.slide) > 0.0), None):
+        raise ModelError(f"track {name!r}: the slide of {flat.name!r} is {flat.slide}, which is no direction")
     if (idlers := sum(w.slide is not None for w in wheels)) != 1 or len(wheels) < 2:
         raise ModelError(
             f"track {name!r}: {idlers} of its {len(wheels)} wheels have a slide; give it to one, the idler, and add "

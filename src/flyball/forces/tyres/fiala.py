@@ -14,7 +14,18 @@ from typing import Annotated, Any, ClassVar
 from ...compiler.formulas import formula
 from ...math.scalar import choose, maximum, sqrt
 from ...model.element import Number, Unit, element, positive
-from .tyre_model import ACROSS, ALONG, CAMBER, CORNERING, OWN, SLIP, TRAIL, ScaledTyre, rolling_moment
+from .tyre_model import (
+    ACROSS,
+    ALONG,
+    CAMBER,
+    CORNERING,
+    OWN,
+    SLIP,
+    TRAIL,
+    ScaledTyre,
+    rolling_direction,
+    rolling_moment,
+)
 
 KIND = 1
 FRICTION = OWN
@@ -41,7 +52,7 @@ def slip_forces(data, at, friction, slip, tangent, camber, load, motion):
     """Return forces and moments; see the module's docstring."""
     mu = friction * data[at + FRICTION]
     o = 0.0 * (slip + tangent)
-    rolled = mu * maximum(slip * motion[0] + 1.0, o + LOCKED)
+    rolled = mu * maximum(slip * rolling_direction(motion) + 1.0, o + LOCKED)
     x = data[at + SLIP] * slip / rolled
     y = -(data[at + CORNERING] * tangent + data[at + CAMBER] * camber) / rolled
     r = sqrt(x * x + y * y + SMALL * SMALL)

@@ -2,8 +2,9 @@
 
 Equations 4.E1 to 4.E78 of Pacejka, *Tire and Vehicle Dynamics* (3rd edition, 2012), in the axes of the files, which are
 the W axes of ISO. Version 5.2 (the 1st edition, 2002; PAC2002) differs in the camber terms of the lateral force (PHY3
-in place of PKY6 and PKY7) and of the trail, in the lateral force that makes the aligning moment, and in angles in place
-of their tangents. The deflections by longitudinal and lateral forces, bottoming, and the change of friction with speed
+in place of PKY6 and PKY7) and of the trail, in the lateral force that makes the aligning moment, and in slip angles in
+place of their tangents. The growth of the free radius (Q_RE0, Q_V1) changes the rolling radius only, not the load. The
+deflections by longitudinal and lateral forces, bottoming, and the change of friction with speed
 are left out. A wheel that runs backwards has the trail on the other side.
 """
 

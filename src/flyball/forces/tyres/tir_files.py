@@ -137,7 +137,13 @@ def completed(numbers: dict[str, Any], who: str) -> dict[str, Any]:
     out = dict.fromkeys((*OWN_NAMES, *OTHER_NAMES), 0.0) | DEFAULTS | numbers
     if "Q_FZ1" not in numbers:
         ratio = out["VERTICAL_STIFFNESS"] * out["UNLOADED_RADIUS"] / out["FNOMIN"]
-        out["Q_FZ1"] = (ratio * ratio - 4.0 * out["Q_FZ2"]) ** 0.5  # so that the stiffness at the nominal load is that
+        square = ratio * ratio - 4.0 * out["Q_FZ2"]
+        if not square > 0.0:
+            raise ModelError(
+                f"{who}: with VERTICAL_STIFFNESS {out['VERTICAL_STIFFNESS']:g} and Q_FZ2 {out['Q_FZ2']:g} the radial "
+                "force has no slope at the nominal load; give Q_FZ1"
+            )
+        out["Q_FZ1"] = square**0.5  # so that the stiffness at the nominal load is that
     if "DREFF" not in numbers and "FREFF" not in numbers:
         out["FREFF"] = 1.0 / 3.0
     return out

@@ -119,8 +119,13 @@ REST = 0.1  # m/s: speed below which the rolling resistance falls to zero
 
 
 @formula
+def rolling_direction(motion):
+    """Return the direction of travel: 1 forwards, -1 backwards, and smooth in between, near standstill."""
+    speed = motion[1]
+    return speed / sqrt(speed * speed + REST * REST)
+
+
+@formula
 def rolling_moment(data, at, load, motion):
     """Return the moment about the lateral axis: minus the coefficient times load and radius, against the rolling."""
-    _, speed, _ = motion
-    way = speed / sqrt(speed * speed + REST * REST)
-    return -data[at + ROLLING] * load * data[at + RADIUS] * way
+    return -data[at + ROLLING] * load * data[at + RADIUS] * rolling_direction(motion)

@@ -307,6 +307,8 @@ class ImpulseStepper:
                 self._arguments = self._loop_arguments()
                 self._addresses = [x.address for x in self._arguments]
             status = step_loop_kernel.call(*self._addresses)
+            if self.recorder is not None:
+                self.recorder.raise_error()
             if status == DONE:
                 return
             if status == NO_SOLUTION:

@@ -36,6 +36,12 @@ class SolveRecorder:
         self._callback = SOLVER_CALL(self._solve)
         self.address = int(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
         self._solver = 0
+        self._error: BaseException | None = None
+
+    def raise_error(self) -> None:
+        """Raise what went wrong while a solve was recorded; compiled code cannot pass it on."""
+        if self._error is not None:
+            raise self._error
 
     def attach(self) -> None:
         """Take the solver's place; again after tables were enlarged, because they bind the solver anew."""
@@ -56,8 +62,11 @@ class SolveRecorder:
         """Solve, as the solver would: called by the step loop."""
         s, r = self.stepper, self.stepper.workspaces
         step, end = int(s.state.counts.steps_taken), float(s.state.times.now + s.state.times.step)
-        if (r.P.size[0] or r.P.size[3]) and self._is_wanted(step, end):
-            self.histories[step] = end, solve_history(s.solver, r.P, copied(r.X), r.O)
+        try:
+            if (r.P.size[0] or r.P.size[3]) and self._is_wanted(step, end):
+                self.histories[step] = end, solve_history(s.solver, r.P, copied(r.X), r.O)
+        except BaseException as error:  # Ctrl-C too: an exception in a callback would be lost
+            self._error = error
         return int(SOLVER_CALL(self._solver)(*words))
 
     def convergence(self) -> Convergence:
