@@ -85,7 +85,12 @@ def _random(family: str, seed: int) -> Made:
 NOT_CONVERTED = {
     **dict.fromkeys(("cam_follower.toml", "gear_backlash.toml"), "play with weights"),
     **dict.fromkeys(("clock_escapement.toml", "geneva_drive.toml", "safety_brake.toml"), "events set parameters"),
-    **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "wrecking_ball.py"), "sets of bodies"),
+    **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "silo.py", "wrecking_ball.py"), "sets of bodies"),
+    "bogie_on_rollers.py": "laws of wheels on rails",
+    "excavator.py": "laws of linear actuators",
+    "governor_criterion.py": "the characteristic of its valve has units of its own",
+    "seven_axes.py": "a controller with the equations of motion",
+    "truck.py": "roads and tyres",
     **dict.fromkeys(("bogie.py", "differential.py", "planetary.py"), "sensors of angular velocities"),
 }
 """Examples that `fuzzing.scaling` cannot write in other units."""

@@ -146,7 +146,7 @@ def add_wheelset(m: fb.Mechanism, k: int, x: str, shapes: list, rollers: bool) -
             m.add(fb.Driver(f"{rail} drive", f"{rail} axle.angle", "-speed/roller_radius*t"))
         profile = wheel_profile(m.environment()["conicity"])
         contact = {"wheel_profile": profile, "rail_arcs": [("head", 0.01), (0.08, 0.026), (0.013, 0.0355)]}
-        contact |= {"inclination": "conicity", "friction": "friction", "dissipation": 0.3, "load": LOAD}
+        contact |= {"inclination": "conicity", "friction": "friction", "dissipation": 0.3, "wheel_load": LOAD}
         contact |= {"roller_radius": "roller_radius"} if rollers else {}
         m.add(fb.WheelOnRail(own, rail, wheelset, at=place, axis=(0, side, 0), radius="wheel_radius", **contact))
 

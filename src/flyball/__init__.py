@@ -154,6 +154,10 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.event import Release as Release
     from .model.event import Set as Set
     from .model.event import Stop as Stop
+    from .model.opencrg import OpenCRG as OpenCRG
+    from .model.random_road import RandomRoad as RandomRoad
+    from .model.road import Road as Road
+    from .model.road import RoadProfile as RoadProfile
     from .model.shapes import *
     from .model.table import Table as Table
     from .model.table_2d import Table2D as Table2D

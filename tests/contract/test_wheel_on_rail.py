@@ -15,7 +15,7 @@ from flyball.testing.formula_checks import frame_record, turned_frame
 STILL = dict.fromkeys(("w", "v", "alpha", "a"), np.zeros(3))
 NO_LAWS = (0.0, 0.0, 0.0)
 SPEED, RADIUS = 20.0, 0.46
-FIELDS = {"radius": RADIUS, "conicity": 0.05, "inclination": 0.05, "dissipation": 0.2, "load": 7e4}
+FIELDS = {"radius": RADIUS, "conicity": 0.05, "inclination": 0.05, "dissipation": 0.2, "wheel_load": 7e4}
 CASES = {
     "track": {},
     "roller": {"roller_radius": 0.5},

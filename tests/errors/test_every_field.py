@@ -93,7 +93,11 @@ CASES |= {f"touching in the {w}": (lambda p: all_of(touching(p)), w == "plane") 
 CASES |= {"others": (lambda: all_of(others()),), "bodies": (lambda: all_of(bodies()),)}
 TEXTS = ("relative_to", "body", "body_i", "body_j", "bodies", "coordinate", "coordinates", "joint", "of", "frame")
 NO_NUMBERS = ("name", "color", "shape", "interpolation", "beyond", "axes", "x_unit", "y_unit")
-LATER = {("JointFriction", "radius")}  # decides what the friction is about, and the joint has no such coordinate
+LATER = {
+    ("JointFriction", "radius"),
+    ("WheelOnRail", "vertical"),
+    ("WheelOnRail", "lateral"),
+}  # their place is refused first
 
 
 def tried(m: fb.Mechanism, kind: type, fields: dict[str, Any]) -> None:

@@ -78,10 +78,8 @@ def test_derivatives_of_functions():
 def test_only_laws_may_be_functions():
     with pytest.raises(ModelError, match="Body 'b': field 'mass' must be a number or a text, got <function"):
         fb.Body("b", mass=misspelt)
-    with pytest.raises(
-        ModelError, match="Actuator 'm': field 'force' must be a number or a text or a function, got None"
-    ):
-        fb.Actuator("m", "A.angle", force=None)
+    with pytest.raises(ModelError, match="Driver 'm': field 'law' must be a number or a text or a function, got None"):
+        fb.Driver("m", "A.angle", None)
 
 
 def test_a_model_file_holds_no_functions():

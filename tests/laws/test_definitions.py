@@ -66,7 +66,7 @@ def test_values_and_derivatives_are_those_of_the_formula(made):
     assert evaluate(code, const, at, stack, (t, x), nothing) == pytest.approx(value(t, x), rel=1e-13)
     assert Expression("law", tree).evaluate({"t": t, "x": x, "a": A}) == pytest.approx(value(t, x), rel=1e-13)
     many = np.linspace(0.1, 1, 7)
-    over = evaluate_over_time(code, const, at, (many, many**2), (np.zeros((0, 7)), np.zeros((0, 7))))
+    over = evaluate_over_time(read_steps(code, at), const, (many, many**2), (np.zeros((0, 7)), np.zeros((0, 7))))
     assert over == pytest.approx(value(many, many**2), rel=1e-13)
     h = 1e-20
     by_step = value(t + 1j * h, x).imag / h

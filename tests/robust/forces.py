@@ -161,25 +161,10 @@ def _point_torque(d: Dice, m: fb.Mechanism, name: str, i: str, j: str, p, stiff:
     return fb.PointTorque(name, j, torque=torque, axes=d.pick(["world", "body"]))
 
 
-def _wheel_on_rail(d: Dice, m: fb.Mechanism, name: str, i: str, j: str, p, stiff: bool):
-    """A wheel that touches where it is drawn; none in the plane."""
-    if m.planar:
-        return None
-    roller = d.pick([None, d.size(0.1, 1.0)])
-    E = d.size(1e8, 1e11) if stiff else d.size(1e3, 1e6)
-    more = {"vertical": law(d, m, 1e-3, ("distance",))} if roller is None and d.chance(0.5) else {}
-    return fb.WheelOnRail(
-        name, i, j, at=p, axis=(0, d.pick([1, -1]), 0), radius=d.size(0.1, 1.0), conicity=d.number(0.01, 0.3),
-        inclination=d.pick([0, 0.05]), roller_radius=roller, youngs_modulus=E, load=d.size(0.1, 10), dissipation=0.1,
-        **more,
-    )  # fmt: skip
-
-
 FORCES = {
     "SpringDamper": _spring,
     "Bushing": _bushing,
     "Rope": _rope,
-    "WheelOnRail": _wheel_on_rail,
     "PathSpring": _path_spring,
     "PointForce": _point_force,
     "PointTorque": _point_torque,

@@ -108,7 +108,7 @@ def test_every_joint(where, name):
 @pytest.mark.parametrize("where", ["space", "plane"])
 def test_every_force(where):
     m = with_forces(where)
-    spatial = {c for c in forces.ALL if c.__name__ == "WheelOnRail"}
+    spatial = {c for c in forces.ALL if c.__name__ in ("WheelOnRail", "Tyre")}
     found = {type(f) for f in m.forces} | (spatial if where == "plane" else set())
     assert found == {c for c in forces.ALL if not getattr(c, "adds_inertia", False)}
     agree(m)

@@ -23,7 +23,7 @@ def wheelset(roller=None, speed=SPEED, drive=True, **more):
                   angular_velocity=(0, speed / RADIUS, 0)))  # fmt: skip
     m.add(fb.Revolute("axle", "box", "set", at=(0, 0, RADIUS), axis=(0, 1, 0)))
     m.add(fb.CoordinateSpring("upright", "box.pitch", stiffness=1e4, damping=1e3))
-    given = {"radius": RADIUS, "conicity": CONE, "inclination": CONE, "dissipation": 0.5, "load": LOAD, **more}
+    given = {"radius": RADIUS, "conicity": CONE, "inclination": CONE, "dissipation": 0.5, "wheel_load": LOAD, **more}
     for name, side in (("left", 1), ("right", -1)):
         rail = f"roller {name}" if roller else "ground"
         if roller:
@@ -77,7 +77,7 @@ def test_a_wheelset_steers_through_a_curve_about_the_rolling_line():
                   angular_velocity=(0, speed / RADIUS, 0)))  # fmt: skip
     shift = RADIUS * HALF / (R * CONE * (1.0 + HEAD * CONE / HALF))
     for name, side in (("left", 1), ("right", -1)):
-        given = {"radius": RADIUS, "conicity": CONE, "inclination": CONE, "dissipation": 0.5, "load": LOAD}
+        given = {"radius": RADIUS, "conicity": CONE, "inclination": CONE, "dissipation": 0.5, "wheel_load": LOAD}
         at = {"at": (0, side * HALF, 0), "axis": (0, side, 0)}
         m.add(fb.WheelOnRail(name, "ground", "set", **at, curve_radius=R - side * HALF, **given))
     run = m.simulate(duration, outputs=401)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
@@ -184,6 +185,15 @@ def figures(par, F, M, laws, data):
     return (distance, speed, *shown, second[0], second[8], across, vertical, ratio)
 
 
+def _flat(values: Iterable[Any]) -> Iterator[Any]:
+    """Yield the numbers of nested tuples."""
+    for x in values:
+        if isinstance(x, tuple):
+            yield from _flat(x)
+        else:
+            yield x
+
+
 def _points(value: Any) -> Any:
     """Accept a list of pairs."""
     value = python_data(value)
@@ -227,7 +237,7 @@ class WheelOnRail(TwoFrameForce):
         to the right; straight if not given. Cant is an ``axis`` that is not horizontal.
     inclination : number
         Slope by which the rail leans towards the middle of the track: 1/40.
-    load : number [N]
+    wheel_load : number [N]
         Normal force in the drawn configuration: the rail is raised or lowered so that the wheel presses so on it.
         If not given, the rail stays where it is drawn.
     conicity : number
@@ -268,7 +278,7 @@ class WheelOnRail(TwoFrameForce):
     roller_radius: Length | None = None
     curve_radius: Length | None = None
     inclination: Ratio = 0.0
-    load: Annotated[Number | None, Unit("N")] = None
+    wheel_load: Annotated[Number | None, Unit("N")] = None
     conicity: Ratio | None = None
     wheel_profile: Profile | None = None
     rail_arcs: Profile | None = None
@@ -339,7 +349,7 @@ class WheelOnRail(TwoFrameForce):
     def check(self, n: SimpleNamespace) -> None:
         """Require valid numbers and profiles."""
         positive(self, n, "radius", "roller_radius", "youngs_modulus", "standstill")
-        nonnegative(self, n, "dissipation", "friction", "load")
+        nonnegative(self, n, "dissipation", "friction", "wheel_load")
         if not n.friction > 0.0:
             raise ModelError(f"{self.title}: friction is 0; give a small one, such as 0.001")
         if not 0.0 <= n.poissons_ratio <= 0.5:
@@ -392,6 +402,11 @@ class WheelOnRail(TwoFrameForce):
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
         """Return the splines of the profiles of wheel and rail, of contact places, and of Kalker's coefficients."""
+        if any(hasattr(x, "called") and not x.known for x in _flat(vars(n).values())):
+            raise ModelError(
+                f"{self.title}: its profiles follow parameters, and curves through symbols are not written out; give "
+                "these parameters as numbers"
+            )
         profiles = profile_splines(n)
         numbers = tuple(float(x.real) for x in self.parameters(n, 0.0))
         places = place_table(numbers, tuple(float(x.real) for profile in profiles for x in profile))
@@ -425,7 +440,7 @@ def moduli(n: SimpleNamespace) -> tuple[float, float]:
 
 
 SHAPING = (
-    "radius", "roller_radius", "conicity", "wheel_profile", "rail_arcs", "rail_profile", "inclination", "load",
+    "radius", "roller_radius", "conicity", "wheel_profile", "rail_arcs", "rail_profile", "inclination", "wheel_load",
     "youngs_modulus", "poissons_ratio",
 )  # fmt: skip
 """Fields that the splines of the profiles depend on."""
@@ -451,7 +466,7 @@ def _profile_splines(values: tuple) -> tuple[list[float], list[float]]:
 
 def _rise(n: SimpleNamespace, rail: np.ndarray, wheel: list[float]) -> Any:
     """Return by how much a rail is raised so that the contact beneath the wheel's centre has the load."""
-    if n.load is None:
+    if n.wheel_load is None:
         return 0.0
     data = np.array([*wheel, *packed_cubic(*rail.T)])
     par = (0.0, float(len(wheel)), 0.0, n.radius, bend(n))
@@ -461,7 +476,7 @@ def _rise(n: SimpleNamespace, rail: np.ndarray, wheel: list[float]) -> Any:
     at = refined_place(par, axis, centre, float(s[np.argmax(depth)]), data)
     _, normal, _, deep, (A, B) = contact_place(par, axis, centre, at, data)
     _, _, force = hertz(A, maximum(B, LEAST_CROSS_CURVATURE * A), moduli(n)[0], 1.0)
-    return ((n.load / force) ** (2.0 / 3.0) - deep) / normal[2]
+    return ((n.wheel_load / force) ** (2.0 / 3.0) - deep) / normal[2]
 
 
 def rail_points(n: SimpleNamespace) -> np.ndarray:

@@ -46,13 +46,14 @@ class ForceView(PartView):
         """Outputs of a force that computes them by a formula of its own."""
         F, M, par = self._frames
         e, S, n = self.element, self._x.system, len(self._result.t)
-        if e.states():
-            found = e.figures(par, F, M, self._states, S.const, S.surfaces)
-        else:
-            k = self._index()
-            a, b = e.inputs(par, F, M)
-            laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
-            found = e.figures(par, F, M, laws, S.const)
+        with np.errstate(all="ignore"):  # without contact
+            if e.states():
+                found = e.figures(par, F, M, self._states, S.const, S.surfaces)
+            else:
+                k = self._index()
+                a, b = e.inputs(par, F, M)
+                laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
+                found = e.figures(par, F, M, laws, S.const)
         return {k: np.broadcast_to(x, (n,)) for k, x in zip(e.outputs, found, strict=True)}
 
     @property
