@@ -154,10 +154,10 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.event import Release as Release
     from .model.event import Set as Set
     from .model.event import Stop as Stop
-    from .model.opencrg import OpenCRG as OpenCRG
-    from .model.random_road import RandomRoad as RandomRoad
-    from .model.road import Road as Road
-    from .model.road import RoadProfile as RoadProfile
+    from .model.roads.opencrg import OpenCRG as OpenCRG
+    from .model.roads.random_road import RandomRoad as RandomRoad
+    from .model.roads.road import Road as Road
+    from .model.roads.road import RoadProfile as RoadProfile
     from .model.shapes import *
     from .model.table import Table as Table
     from .model.table_2d import Table2D as Table2D
@@ -220,10 +220,10 @@ _HOME = {
     "MaterialPair": "model.contact",
     "Sensor": "model.controller",
     "IMU": "model.controller",
-    "Road": "model.road",
-    "RoadProfile": "model.road",
-    "RandomRoad": "model.random_road",
-    "OpenCRG": "model.opencrg",
+    "Road": "model.roads.road",
+    "RoadProfile": "model.roads.road",
+    "RandomRoad": "model.roads.random_road",
+    "OpenCRG": "model.roads.opencrg",
     "LinearTyre": "forces.tyres",
     "FialaTyre": "forces.tyres",
     "MagicFormula": "forces.tyres",

@@ -9,7 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.model.element import Element
-from flyball.model.road import RoadSurface
+from flyball.model.roads.road import RoadSurface
 from flyball.model.shapes import Solid
 from flyball.rotations import from_axis_angle, matrix
 from tests.pages import ROOT

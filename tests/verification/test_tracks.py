@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.vehicles.track_path import chords, taut_band
+from flyball.vehicles.track import chords, taut_band
 from tests.mechanisms import EXAMPLES
 
 VEHICLE = runpy.run_path(str(EXAMPLES / "tracked_vehicle.py"))

@@ -36,7 +36,7 @@ from ..results.modes import Crossing, RootLocus, half_plane
 from ..statics.equilibrium import equilibrium, rest_options
 from ..statics.equilibrium_series import EquilibriaOptions, checked_values, equilibria, series_error
 from .linearize import LinearizeOptions, OperatingPointOptions, controlled_linear_model, equations_without_inputs
-from .sampled_root_locus import sampled_root_locus
+from .sampling_cycle import sampled_root_locus
 
 
 @dataclass

@@ -23,8 +23,8 @@ from .element import Element, Flag, Number, Numbers, Unit, fields_with
 from .event import Action
 from .model import Model
 from .model_files import DEFAULT_KINDS, FEW_KINDS, MANY_KINDS, ONE_KIND, element_types
-from .opencrg import OpenCRG as OpenCRG
-from .random_road import RandomRoad as RandomRoad
+from .roads.opencrg import OpenCRG as OpenCRG
+from .roads.random_road import RandomRoad as RandomRoad
 from .shapes import SHAPES, SURFACES
 from .shapes.solid import Solid
 from .snapshot import CATEGORIES

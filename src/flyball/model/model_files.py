@@ -33,7 +33,7 @@ from .linked_files import LinkedFile, current_folder, paths_from
 from .messages import listing, suggest_part
 from .model import Model, suggest
 from .output_files import DESCRIPTION, file_extension, write_file
-from .road import Road
+from .roads.road import Road
 from .snapshot import CATEGORIES, part_owners
 from .table import Table
 from .table_2d import Table2D

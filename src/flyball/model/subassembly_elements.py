@@ -30,7 +30,7 @@ from .names import curve_parts
 from .placement import Placement, product, rotation_of, scaled, total
 from .quantities import ENERGY, quantities
 from .quantity_images import Image, component_image, joint_image, located_image
-from .road import Road
+from .roads.road import Road
 from .snapshot import part_owners
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from ..model.event import Event
 from ..model.force import CoordinateForce, Force
 from ..model.names import curve_parts, is_curve
 from ..model.quantities import Curve, measured_quantity, transmitted_force
-from ..model.road import Road
+from ..model.roads.road import Road
 from .constraint_rows import coordinate_frames, coordinate_term, measured_term
 from .forest import coordinate_row
 from .structure_definition import Structure, frame_index

@@ -1,1 +1,1 @@
-"""Running gear of vehicles, each by one call: tracks (`track`), laid around wheels (`track_path`)."""
+"""Running gear of vehicles, each by one call: tracks (`track`)."""

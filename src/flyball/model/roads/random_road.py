@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ModelError
-from .element import element
+from ...errors import ModelError
+from ..element import element
 from .road import RoadGrid, RoadProfile, RoadSurface
 
 REFERENCE = 0.1  # cycles/m: reference spatial frequency n0

@@ -11,11 +11,11 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator
 
-from ..errors import ModelError
-from .body import GROUND, Frame
-from .element import Element, Number, Unit, described_part, element, positive, python_data, resolve
-from .shapes.height_field import HeightField
-from .units import split_quantity
+from ...errors import ModelError
+from ..body import GROUND, Frame
+from ..element import Element, Number, Unit, described_part, element, positive, python_data, resolve
+from ..shapes.height_field import HeightField
+from ..units import split_quantity
 
 MOST_HEIGHTS = 50_000_000
 

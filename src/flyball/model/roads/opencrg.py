@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..errors import ModelError
-from .element import element
-from .linked_files import FilePath, LinkedFile
+from ...errors import ModelError
+from ..element import element
+from ..linked_files import FilePath, LinkedFile
 from .road import RoadGrid, RoadSurface
 
 CELL, CELLS = 10, 8  # characters of a number, and numbers in a line, of formatted data (LRFI)
