@@ -16,7 +16,7 @@ from flyball.forces.wheel_rail_geometry import PLACES_WIDTH
 from flyball.forces.wheel_rail_geometry import RAIL_WIDTH as WHEEL_RAIL
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
-from flyball.model.snapshot import CATEGORIES
+from flyball.model.snapshot import CATEGORIES, part_owners
 from flyball.tables.structure_definition import Structure
 from flyball.tables.table_definitions import REVOLUTE
 from flyball.tables.values import Values, values
@@ -70,7 +70,9 @@ class _Numbers:
 def with_parameters(m: fb.Mechanism) -> tuple[fb.Mechanism, dict[str, str]]:
     """A copy of a mechanism with a parameter, zero as it stands, for each field of its elements; field -> parameter."""
     numbers = _Numbers(m.planar, m.environment())
-    parts = [numbers.element(e) for category in CATEGORIES for e in getattr(m, category)]
+    owned = part_owners(m)
+    every = [e for category in CATEGORIES for e in getattr(m, category) if e.name not in owned]
+    parts = [numbers.element(e) for e in every]
     gravity = numbers.value(m.gravity, "gravity", "m/s^2")
     zeros = dict.fromkeys(numbers.names.values(), 0.0)
     out = fb.Mechanism(m.name, planar=m.planar, gravity=gravity, parameters={**m.parameters, **zeros})

@@ -18,7 +18,7 @@ pytestmark = both_layers
 SOFT = {
     "youngs_modulus": 1e4,
     "inclination": 0.05,
-    "load": 0.5,
+    "wheel_load": 0.5,
     "dissipation": 0.1,
     "friction": 0.1,
     "rail_arcs": [(5.0, 2.0)],

@@ -163,7 +163,7 @@ def derailed(par, M, frame):
     _, l, n, y, z = frame
     a = scale(par[SIDE], col(M[1], 1))
     o = 0.0 * y
-    low = TRAVEL - (z - par[RADIUS])
+    low = par[RADIUS] - z
     return choose(low, choose(absolute(y + par[RADIUS] * dot(a, n)) - TRAVEL, math.nan + o, o), o)
 
 

@@ -500,7 +500,7 @@ def _sampled_locus(
         return found.A
 
     with progress_bar(o.progress, f"multipliers over {o.parameter}") as tell:
-        return sampled_root_locus(done, points, matrix, tell)
+        return sampled_root_locus(done, points, matrix, series_error, tell)
 
 
 class _EquilibriumBranch:

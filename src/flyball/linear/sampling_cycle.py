@@ -26,7 +26,6 @@ from ..errors import AnalysisError, ModelError
 from ..progress import ReportProgress
 from ..results.linear_model import StateSpaceForm
 from ..results.modes import Crossing, RootLocus, outside_circle
-from ..statics.equilibrium_series import series_error
 
 PERIOD_TOLERANCE = 1e-9  # relative deviation allowed from a common period
 MAX_INSTANTS = 10_000  # largest denominator of a ratio of periods, and largest number of instants in a cycle
@@ -178,9 +177,12 @@ ON_REAL_AXIS = 1e-9  # imaginary part, relative to the multiplier, that counts a
 MAX_BISECTIONS = 48
 
 CycleMatrix = Callable[[float], np.ndarray]
+LocusFailure = Callable[[RootLocus, float, AnalysisError], Exception]
 
 
-def sampled_root_locus(done: RootLocus, points: np.ndarray, matrix: CycleMatrix, report: ReportProgress) -> RootLocus:
+def sampled_root_locus(
+    done: RootLocus, points: np.ndarray, matrix: CycleMatrix, failure: LocusFailure, report: ReportProgress
+) -> RootLocus:
     """Complete a locus: branches of the multipliers at the values of the parameter, and the changes of stability.
 
     Parameters
@@ -191,6 +193,8 @@ def sampled_root_locus(done: RootLocus, points: np.ndarray, matrix: CycleMatrix,
         Values of the parameter.
     matrix : callable
         Returns the matrix of one cycle for a value.
+    failure : callable
+        Returns the error to raise for an `AnalysisError` at a value.
     report : callable
     """
     rows: list[np.ndarray] = []
@@ -200,7 +204,7 @@ def sampled_root_locus(done: RootLocus, points: np.ndarray, matrix: CycleMatrix,
             if rows and len(w) != len(rows[0]):
                 raise AnalysisError(f"there are {len(w)} states, and {len(rows[0])} at the values before")
         except AnalysisError as error:
-            raise series_error(done, value, error) from error
+            raise failure(done, value, error) from error
         rows.append(w[_continued(rows[-1], w)] if rows else w[np.lexsort((w.real, w.imag))])
         done.values, done.eigenvalues = points[: k + 1], np.array(rows)
         done.path_values, done.path = done.values, done.eigenvalues
@@ -209,7 +213,7 @@ def sampled_root_locus(done: RootLocus, points: np.ndarray, matrix: CycleMatrix,
         try:
             done.crossings += _crossings(matrix, a, b)
         except AnalysisError as error:
-            raise series_error(done, a, error) from error
+            raise failure(done, a, error) from error
     report(1.0, "")
     return done
 
