@@ -88,9 +88,6 @@ NOT_CONVERTED = {
     **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "silo.py", "wrecking_ball.py"), "sets of bodies"),
     "bogie_on_rollers.py": "laws of wheels on rails",
     "excavator.py": "laws of linear actuators",
-    "governor_criterion.py": "the characteristic of its valve has units of its own",
-    "seven_axes.py": "a controller with the equations of motion",
-    "truck.py": "roads and tyres",
     **dict.fromkeys(("bogie.py", "differential.py", "planetary.py"), "sensors of angular velocities"),
 }
 """Examples that `fuzzing.scaling` cannot write in other units."""
@@ -99,8 +96,8 @@ EXEMPT = {
     "soft": "pow() of overlaps rounds otherwise in other units of length",
 }
 """Motions that may differ, by family, and why."""
-ROBOTS = ("quadruped.py", "robot_arm_circle.py", "five_bar.py")
-"""Examples whose controllers' laws, or tables made by Python, this program does not rewrite in other units."""
+ROBOTS = ("quadruped.py", "robot_arm_circle.py", "five_bar.py", "seven_axes.py", "governor_criterion.py", "truck.py")
+"""Examples with laws of controllers, tables made by Python, roads or tyres, not rewritten here in other units."""
 UNDECIDED = {
     ("sticking 0", "kinematics"): "friction at rates that are rounding has their sign",
     ("car.toml", "singularities"): "its driver is along an angle of a body, which is no curve of a linear model",

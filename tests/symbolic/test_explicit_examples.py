@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from flyball.model.contact import has_contact
-from tests.examples.test_examples import EVENTS, ROBOTS
+from tests.examples.test_examples import EVENTS, LARGE, ROBOTS
 from tests.mechanisms import EXAMPLES, example
 from tests.symbolic.explicit_made import engine, whole
 
-NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py") and p.name not in ROBOTS)
+NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py") and p.name not in ROBOTS | LARGE)
 
 
 @pytest.mark.parametrize("name", NAMES)

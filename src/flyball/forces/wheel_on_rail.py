@@ -13,7 +13,7 @@ from pydantic import BeforeValidator
 
 from ..compiler.formulas import formula
 from ..errors import ModelError
-from ..math.scalar import absolute, choose, maximum, nonpositive, unless_zero
+from ..math.scalar import absolute, choose, maximum, nonpositive
 from ..math.vec import add, col, cross, dot, scale, sub
 from ..model.element import (
     Direction,
@@ -181,7 +181,7 @@ def figures(par, F, M, laws, data):
     (f, _, shown), (g, _, second), (_, l, n, _, _) = both_contacts(par, F, M, laws, data)
     distance, speed = inputs(par, F, M)
     across, vertical = -dot(l, add(f, g)), dot(n, add(f, g))
-    ratio = across / unless_zero(vertical, vertical, 1.0 + 0.0 * vertical)
+    ratio = across / choose(vertical, vertical, 1.0 + 0.0 * vertical)
     return (distance, speed, *shown, second[0], second[8], across, vertical, ratio)
 
 
