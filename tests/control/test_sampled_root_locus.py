@@ -69,6 +69,24 @@ def test_divergence_at_one():
     assert c.value == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("parameter", "values", "kind", "value"),
+    [
+        ("d", [5, 60], "alternation", 40.0),
+        ("d", [5, 60, 20], "alternation", 40.0),
+        ("d", [60, 5], "alternation", 40.0),
+        ("k", [5, -5], "divergence", 0.0),
+        ("k", [10, 5, -5, -10], "divergence", 0.0),
+    ],
+)
+def test_a_pair_that_becomes_real_on_the_way(parameter, values, kind, value):
+    m = servo("-k*G.displacement - d*G.displacement_rate")
+    c = m.root_locus(parameter, values, progress=False).crossings[0]
+    assert c.kind == kind
+    assert c.value == pytest.approx(value, abs=1e-8)
+    assert abs(c.eigenvalue) == pytest.approx(1.0, abs=1e-9)
+
+
 def test_plot(tmp_path):
     m = servo("-k*G.displacement - d*G.displacement_rate")
     m.root_locus("d", np.linspace(2, 60, 30), progress=False).plot(tmp_path / "locus.png")

@@ -106,6 +106,15 @@ def test_free_vibration_decays_and_energy_balances():
     assert r.events["R_turns"][0].t > 0
 
 
+def test_in_a_part_of_another_mechanism():
+    part, whole = (
+        mount(fb.Initial("G.displacement", value=2e-3), **VISCOUS, **FRICTION),
+        fb.Mechanism("whole", planar=True),
+    )
+    whole.add(part, prefix="left")
+    assert whole.simulate(0.1)["left.R.force"] == pytest.approx(part.simulate(0.1)["R.force"], abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("fields", "why"),
     [

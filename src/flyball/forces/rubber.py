@@ -84,7 +84,7 @@ class Rubber(CoordinateForce):
 
     def check(self, n: SimpleNamespace) -> None:
         """Require one stiffness for each relaxation time, a travel for friction, and signs."""
-        if not self.name.isidentifier():
+        if not all(word.isidentifier() for word in self.name.split(".")):
             raise ModelError(f"{self.title}: its parts occur in expressions; give it a name of one word")
         nonnegative(self, n, "stiffness", "friction")
         refuse_without_stiffness(self, "rest", 0.0)

@@ -407,7 +407,10 @@ class WheelOnRail(TwoFrameForce):
                 f"{self.title}: its profiles follow parameters, and curves through symbols are not written out; give "
                 "these parameters as numbers"
             )
-        profiles = profile_splines(n)
+        try:
+            profiles = profile_splines(n)
+        except ModelError as error:
+            raise ModelError(f"{self.title}: {error}") from None
         numbers = tuple(float(x.real) for x in self.parameters(n, 0.0))
         places = place_table(numbers, tuple(float(x.real) for profile in profiles for x in profile))
         return (*profiles, list(places), kalker_table(n.poissons_ratio))
@@ -473,7 +476,13 @@ def _rise(n: SimpleNamespace, rail: np.ndarray, wheel: list[float]) -> Any:
     axis, centre = (0.0, 1.0, 0.0), (0.0, n.radius)
     s = np.linspace(rail[0, 0].real, rail[-1, 0].real, SAMPLES)
     depth = depth_at(tuple(x.real for x in par), axis, (0.0, n.radius.real), s, data.real)[0]
-    at = refined_place(par, axis, centre, float(s[np.argmax(depth)]), data)
+    deepest = int(np.argmax(depth))
+    if deepest in (0, SAMPLES - 1):
+        raise ModelError(
+            f"its wheel is deepest at the end y = {s[deepest]:.4g} m of the rail's profile, where it has no contact; "
+            "give the rail a profile or arcs that reach farther, or an inclination nearer to the conicity"
+        )
+    at = refined_place(par, axis, centre, float(s[deepest]), data)
     _, normal, _, deep, (A, B) = contact_place(par, axis, centre, at, data)
     _, _, force = hertz(A, maximum(B, LEAST_CROSS_CURVATURE * A), moduli(n)[0], 1.0)
     return ((n.wheel_load / force) ** (2.0 / 3.0) - deep) / normal[2]

@@ -239,7 +239,8 @@ def _crossings(matrix: CycleMatrix, a: float, b: float) -> list[Crossing]:
             continue
         alone = len(moved) == 1 or (len(moved) == 2 and _is_pair(here[moved]) and _is_pair(there[on][moved]))
         if alone or depth == MAX_BISECTIONS:
-            out.append(_located(matrix, (a, b), here[moved[np.argmax(here[moved].imag)]], change))
+            outside = max(int(outside_circle(w).sum()) for w in (here, there))
+            out.append(_located(matrix, (a, b), outside, change))
             continue
         middle = 0.5 * (a + b)
         waiting += [(middle, b, depth + 1), (a, middle, depth + 1)]
@@ -250,27 +251,29 @@ def _is_pair(w: np.ndarray) -> bool:
     return bool(abs(w[0] - w[1].conjugate()) <= ON_REAL_AXIS * abs(w[0]))
 
 
-def _located(matrix: CycleMatrix, between: tuple[float, float], begin: complex, change: int) -> Crossing:
-    """The value at which the branch that is ``begin`` at the first end crosses the unit circle."""
+def _located(matrix: CycleMatrix, between: tuple[float, float], outside: int, change: int) -> Crossing:
+    """The value at which the multiplier of that rank in size, or the pair that ends with it, crosses the unit circle.
+
+    ``outside`` is the larger number of multipliers outside the circle at the ends: the size of that rank is a
+    continuous function, above 1 at one end and not at the other.
+    """
     from scipy.optimize import brentq
 
     a, b = between
-    known = {a: begin}
+
+    def ranked(x: float) -> complex:
+        w = np.linalg.eigvals(matrix(x))
+        return complex(w[np.argsort(-np.abs(w))[outside - 1]])
 
     def distance(x: float) -> float:
-        w = np.linalg.eigvals(matrix(x))
-        near = known[min(known, key=lambda k: abs(k - x))]
-        known[x] = complex(w[np.argmin(np.abs(w - near))])
-        return abs(known[x]) - 1.0
+        return abs(ranked(x)) - 1.0
 
-    for part in np.linspace(0.0, 1.0, 9)[1:]:  # follow the branch, so that the nearest known multiplier is its own
-        distance(a + part * (b - a))
-    if distance(a) * distance(b) > 0.0:
-        value = a
+    ends = distance(a), distance(b)
+    if ends[0] * ends[1] > 0.0:  # on the circle but for rounding at one end
+        value = a if abs(ends[0]) < abs(ends[1]) else b
     else:
         value = float(brentq(distance, a, b, xtol=ROOT_TOLERANCE * abs(b - a), rtol=1e-14))
-    distance(value)
-    z = known[value]
+    z = ranked(value)
     if abs(z.imag) > ON_REAL_AXIS * abs(z):
         return Crossing(value, complex(z.real, abs(z.imag)), "flutter", change)
     return Crossing(value, complex(z.real), "divergence" if z.real > 0.0 else "alternation", change)
