@@ -108,3 +108,12 @@ def test_friction_of_the_road_scales_the_limit():
     whole = patch_state(par, F, M, (0.2, 0.0), data, np.zeros(1))
     slippery = patch_state(tuple(half), F, M, (0.2, 0.0), data, np.zeros(1))
     assert slippery[4][0] == pytest.approx(0.5 * whole[4][0], rel=2e-3)
+
+
+def test_a_wheel_below_its_road_stops_the_motion():
+    m = fb.Mechanism("sunk", gravity=(0, 0, -9.81))
+    m.add(fb.Body("wheel", mass=20, inertia=(1, 1, 1), position=(0, 0, -5)))
+    model = fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)
+    m.add(fb.Tyre("t", "ground", "wheel", model=model))
+    with pytest.raises(fb.FlyballError, match="beneath it"):
+        m.simulate(0.1)

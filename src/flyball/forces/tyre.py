@@ -18,6 +18,7 @@ points, on the plane of their mean height and mean slopes (Pacejka 2012, section
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
@@ -26,7 +27,7 @@ import numpy as np
 
 from ..compiler.formulas import formula
 from ..errors import ModelError
-from ..math.scalar import absolute, asin, atan, cos, integer_power, minimum, sqrt
+from ..math.scalar import absolute, asin, atan, choose, cos, integer_power, minimum, sqrt
 from ..math.vec import add, col, cross, dot, mtv, mv, scale, sub
 from ..model.body import GROUND
 from ..model.element import (
@@ -163,7 +164,9 @@ def wrench_and_rates(par, F, M, states, data, surfaces):
     place, _, state, _, forces, rates = patch_state(par, F, M, states, data, surfaces)
     x, y, z = place[2]
     fx, fy, mx, my, mz = forces
-    force = add(add(scale(fx, x), scale(fy, y)), scale(state[0], z))
+    o = 0.0 * fx
+    load = state[0] + choose(place[4], o, o + math.nan)  # a wheel whose centre is below the road is on no side of it
+    force = add(add(scale(fx, x), scale(fy, y)), scale(load, z))
     torque = add(add(scale(mx, x), scale(my, y)), scale(mz, z))
     torque = add(torque, cross(sub(place[1], place[0]), force))
     return mv(F[1], force), mv(F[1], torque), rates
@@ -234,8 +237,9 @@ class Tyre(TwoFrameForce):
         "deflection": "m", "rolling_radius": "m", "contact_x": "m", "contact_y": "m", "contact_z": "m",
     }  # fmt: skip
     fails: ClassVar[str] = (
-        "There is no road below it: the road ends there, or has no height. Make the road longer, give it "
-        'beyond="hold", or end the motion earlier; or its numbers are too large'
+        "There is no road below it: the road ends there, has no height, or the wheel's centre is beneath it. Make the "
+        'road longer, give it beyond="hold", place the wheel above it, or end the motion earlier; or its numbers are '
+        "too large"
     )
 
     def needs(self) -> str:
