@@ -111,9 +111,9 @@ def test_friction_of_the_road_scales_the_limit():
 
 
 def test_a_wheel_below_its_road_stops_the_motion():
-    m = fb.Mechanism("sunk", gravity=(0, 0, -9.81))
+    m = fb.Mechanism("sunk wheel", gravity=(0, 0, -9.81))
     m.add(fb.Body("wheel", mass=20, inertia=(1, 1, 1), position=(0, 0, -5)))
     model = fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)
-    m.add(fb.Tyre("t", "ground", "wheel", model=model))
+    m.add(fb.Tyre("tyre", "ground", "wheel", model=model))
     with pytest.raises(fb.FlyballError, match="beneath it"):
         m.simulate(0.1)
