@@ -54,17 +54,19 @@ def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
     made, nv = jacobian_layout(s, S), s.nv
 
     def by(kinds, terms, task):
-        steps = np.zeros((len(kinds) * terms.groups, 3 * nv + 1), complex)
+        nx = made.nx  # states follow the velocities
+        steps = np.zeros((len(kinds) * terms.groups, 3 * nv + 1 + nx), complex)
         for n, kind in enumerate(kinds):
-            steps[n * terms.groups + terms.group, kind * nv + np.arange(nv)] = 1j * COMPLEX_STEP
+            steps[n * terms.groups + terms.group[:nv], kind * nv + np.arange(nv)] = 1j * COMPLEX_STEP
         out = np.zeros((len(steps), made.places), complex)
         t, y, vdot, lam = np.array([x.t + 0j]), x.y.astype(complex), x.vdot.astype(complex), x.lam.astype(complex)
         bench = ResidualBatch(t, y, vdot, lam, steps, out)
         residuals_kernel(SC, WC, bench, bench, bench, task)
         entry, step, place = terms.pick.T
         found = [out[step + n * terms.groups, place].imag / COMPLEX_STEP for n in range(len(kinds))]
-        size = nv + len(s.rows), nv
-        return [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=size).toarray() for f in found]
+        size = nv + nx + len(s.rows), nv + nx
+        whole = [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=size).toarray() for f in found]
+        return [np.delete(J, np.arange(nv, nv + nx), axis=0)[:, :nv] for J in whole]
 
     (P, D), (M,) = by((0, 1), made.terms, RESIDUAL_TERMS), by((2,), made.mass, INERTIAL_TERMS)
     for J, whole in ((P, full.by_position), (D, full.by_velocity), (M, full.by_acceleration)):

@@ -165,11 +165,11 @@ def wrench_and_rates(par, F, M, states, data, surfaces):
     x, y, z = place[2]
     fx, fy, mx, my, mz = forces
     o = 0.0 * fx
-    load = state[0] + choose(place[4], o, o + math.nan)  # a wheel whose centre is below the road is on no side of it
-    force = add(add(scale(fx, x), scale(fy, y)), scale(load, z))
+    force = add(add(scale(fx, x), scale(fy, y)), scale(state[0], z))
     torque = add(add(scale(mx, x), scale(my, y)), scale(mz, z))
     torque = add(torque, cross(sub(place[1], place[0]), force))
-    return mv(F[1], force), mv(F[1], torque), rates
+    below = choose(place[4], o, o + math.nan)  # a wheel whose centre is below the road is on no side of it
+    return add(mv(F[1], force), (below, below, below)), mv(F[1], torque), rates
 
 
 def figures(par: Any, F: Any, M: Any, states: Any, data: Any, surfaces: Any) -> tuple[Any, ...]:

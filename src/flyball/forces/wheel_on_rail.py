@@ -122,8 +122,9 @@ def contact_force(par, F, M, frame, axis, place, taken, data):
     C = kalker_coefficients(data, table, a / b)
     fx, fy = polach(par[SHEAR], par[FRICTION] * load, a, b, C, creepages)
     way = choose(speed, 1.0 + 0.0 * depth, -1.0 + 0.0 * depth)
-    load, out = load + ended, par[SIDE]
+    out = par[SIDE]
     force = add(scale(load, up), add(scale(way * fx, ahead), scale(fy, aside)))
+    load, force = load + ended, add(force, (ended, ended, ended))
     c, u = when(depth, (creepages[0], out * creepages[1], out * creepages[2])), when(depth, (load, fx, out * fy))
     e, q = when(depth, (a, b, deep)), when(depth, (s, p[1], s))
     shown = (u[0], c[0], c[1], c[2], u[1], u[2], e[0], e[1], q[0], q[1], e[2])
