@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, replace
+from dataclasses import KW_ONLY
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -155,4 +155,4 @@ def with_leaves(tree: SyntaxNode, leaves: Mapping[str, SyntaxNode]) -> SyntaxNod
     """Return the tree with other trees in place of some names."""
     if tree.kind == "name":
         return leaves.get(tree.value, tree)
-    return replace(tree, args=tuple(with_leaves(a, leaves) for a in tree.args)) if tree.args else tree
+    return tree.with_args(tuple(with_leaves(a, leaves) for a in tree.args))

@@ -232,7 +232,7 @@ def _with_side(node: SyntaxNode, at: int, value: float) -> SyntaxNode:
     """A node with a number in place of one side."""
     if node.kind == SIDE and node.value == at:
         return SyntaxNode("number", value=value)
-    return replace(node, args=tuple(_with_side(arg, at, value) for arg in node.args)) if node.args else node
+    return node.with_args(tuple(_with_side(arg, at, value) for arg in node.args))
 
 
 def _side(node: SyntaxNode, u: SyntaxNode, corners: CornerLookup) -> SyntaxNode:
@@ -452,7 +452,7 @@ def _single_powers(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
 
     At u = 0 the result then has the derivatives of the merged power, while those of a factor may be infinite.
     """
-    node = replace(node, args=tuple(_single_powers(arg, varying) for arg in node.args)) if node.args else node
+    node = node.with_args(tuple(_single_powers(arg, varying) for arg in node.args))
     if node.kind != "*" and not (node.kind == "**" and is_small_integer(node.args[1])):
         return node
     groups: dict[Any, tuple[SyntaxNode, float, bool]] = {}
@@ -512,7 +512,7 @@ def _with_code(tree: SyntaxNode, code: list[int], functions: list[CalledFunction
     """The tree with code positions of function calls in place of the functions."""
     args = tuple(_with_code(arg, code, functions) for arg in tree.args)
     if tree.kind != "called":
-        return replace(tree, args=args) if args else tree
+        return tree.with_args(args)
     return SyntaxNode("function", args, _function(tree.value, code, functions), tree.start, tree.stop)
 
 

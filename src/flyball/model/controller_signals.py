@@ -346,14 +346,14 @@ def _replaced(tree: SyntaxNode, found: Any) -> SyntaxNode:
     if tree.kind == "name":
         new = found(tree)
         return tree if new is None else _at(new, tree.start)
-    if not tree.args:
-        return tree
-    return dataclasses.replace(tree, args=tuple(_replaced(a, found) for a in tree.args))
+    return tree.with_args(tuple(_replaced(a, found) for a in tree.args))
 
 
 def _at(tree: SyntaxNode, start: int) -> SyntaxNode:
     """Return the tree as if it were at a position of zero width."""
-    return dataclasses.replace(tree, start=start, stop=start, args=tuple(_at(a, start) for a in tree.args))
+    if tree.start == tree.stop == start:  # parsed text has a width, so all of this tree is at the position already
+        return tree
+    return SyntaxNode(tree.kind, tuple(_at(a, start) for a in tree.args), tree.value, start, start)
 
 
 def refuse_in_driver(model: Model, law: Expression, where: str) -> None:

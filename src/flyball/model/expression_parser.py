@@ -81,10 +81,18 @@ class SyntaxNode:
     stop: int = 0
 
     def walk(self) -> Iterator[SyntaxNode]:
-        """Yield this node and all nodes below it."""
-        yield self
-        for arg in self.args:
-            yield from arg.walk()
+        """Yield this node and all nodes below it, each before its operands."""
+        waiting = [self]
+        while waiting:
+            node = waiting.pop()
+            yield node
+            waiting.extend(reversed(node.args))
+
+    def with_args(self, args: tuple[SyntaxNode, ...]) -> SyntaxNode:
+        """Return this operation with other operands; itself if they are the same objects."""
+        if all(a is b for a, b in zip(args, self.args, strict=True)):
+            return self
+        return SyntaxNode(self.kind, args, self.value, self.start, self.stop)
 
 
 def called_table(node: SyntaxNode) -> tuple[str, int]:

@@ -11,7 +11,7 @@ import keyword
 import operator
 import sys
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from numbers import Complex, Integral, Real
 from typing import TYPE_CHECKING, Any
@@ -245,7 +245,7 @@ def fold_constants(node: SyntaxNode, text: str) -> SyntaxNode:
         wider = f"give x1 another value than x0 = {value:g}; a jump is where(x < {value:g}, y0, y1)"
         refuse_expression(text, node.start, node.stop, "this step has no width", wider)
     if node.kind in _UNFOLDED or any(arg.kind != "number" for arg in args):
-        return replace(node, args=args)
+        return node.with_args(args)
     value = float(OPERATIONS[node.kind](*(float(arg.value) for arg in args)))
     if value - value != 0.0:
         problem = f"this part is {value}, which is not a finite number"
