@@ -248,7 +248,7 @@ class MotionMethods(Model):
         t_start: float | str | None = None,
         outputs: int | Sequence[float] = 501,
         parameters: Mapping[str, float | str] | None = None,
-        start: Result | None = None,
+        start: Result | Equilibrium | None = None,
         coordinates: str = "auto",
         method: str | Stepping = "auto",
         rtol: float = 1e-7,
@@ -283,8 +283,8 @@ class MotionMethods(Model):
             Number of evenly spaced output times, or the times themselves.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
-        start : Result, optional
-            Continue from the end of this result.
+        start : Equilibrium or Result, optional
+            Continue from the end of this result, or start in this equilibrium or steady motion.
         coordinates : {"auto", "absolute", "joint"}
             Coordinates of the equations; auto: those with the cheaper right-hand side. Results do not depend on it.
         method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
@@ -499,7 +499,7 @@ class MotionMethods(Model):
         formulations: Sequence[str] | None = None,
         repeats: int = 5,
         parameters: Mapping[str, float | str] | None = None,
-        start: Result | None = None,
+        start: Result | Equilibrium | None = None,
         method: str = "dop853",
         step: float | str | None = None,
         rtol: float = 1e-7,
@@ -533,8 +533,8 @@ class MotionMethods(Model):
             Number of runs for measuring the cost, fewer if they take long; 0 for none.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
-        start : Result, optional
-            Continue from the end of this result.
+        start : Equilibrium or Result, optional
+            Continue from the end of this result, or start in this equilibrium or steady motion.
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
         step : float or str [s], optional
@@ -681,7 +681,7 @@ class StaticsMethods(Model):
         *,
         t: float | str = 0.0,
         parameters: Mapping[str, float | str] | None = None,
-        start: Equilibrium | Result | None = None,
+        start: Result | Equilibrium | None = None,
         stable: bool = False,
         preload: Sequence[str] = (),
         turning: Sequence[str] = (),
@@ -737,7 +737,7 @@ class StaticsMethods(Model):
         *,
         t: float | str = 0.0,
         parameters: Mapping[str, float | str] | None = None,
-        start: Equilibrium | Result | None = None,
+        start: Result | Equilibrium | None = None,
         stable: bool = False,
         progress: bool | Callable[[float], None] = True,
     ) -> EquilibriumSeries:
@@ -1168,7 +1168,7 @@ class DesignMethods(Model):
         samples: int | None = None,
         seed: int | None = None,
         parameters: Mapping[str, float | str] | None = None,
-        start: Result | None = None,
+        start: Result | Equilibrium | None = None,
         coordinates: str = "auto",
         method: str | Stepping = "auto",
         rtol: float = 1e-7,
@@ -1231,8 +1231,8 @@ class DesignMethods(Model):
             Seed of the samples: 0 if not given, so that the same call gives the same samples.
         parameters : mapping, optional
             Values of other parameters in place of the model's, in SI units or with a unit.
-        start : Result, optional
-            Every run continues from the end of this result.
+        start : Equilibrium or Result, optional
+            Every run continues from the end of this result, or starts in this equilibrium or steady motion.
         coordinates : {"auto", "absolute", "joint"}
             As for `simulate`.
         method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping

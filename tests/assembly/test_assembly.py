@@ -316,3 +316,17 @@ def test_large_turns_do_not_depend_on_the_axes_of_the_world(target):
         )  # fmt: skip
         angles.append(m.simulate(1e-9, outputs=2)["B"].angle[0])
     np.testing.assert_allclose(angles, angles[0], atol=1e-8)
+
+
+@pytest.mark.parametrize("angle", [np.pi, -np.pi, np.pi + 1e-9, 3 * np.pi, -3 * np.pi, 5 * np.pi, 3.2, 2 * np.pi])
+def test_an_initial_angle_of_any_number_of_half_turns_is_kept(angle):
+    """At half a turn from the drawn position both ways round lead there; the turns are those that are given."""
+    free, hinged = (fb.Mechanism("wheel", gravity=(0, 0, 0)) for _ in range(2))
+    for m in (free, hinged):
+        m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)))
+    free.add(fb.Initial("b.yaw", value=angle))
+    hinged.add(fb.Revolute("R", "ground", "b", at=(0, 0, 0), axis=(0, 0, 1)), fb.Initial("R.angle", value=angle))
+    assert free.simulate(0.01)["b.yaw"][0] == pytest.approx(angle, abs=1e-12)
+    for coordinates in ("joint", "absolute"):
+        run = hinged.simulate(0.01, coordinates=coordinates)
+        assert run["R.angle"][0] == pytest.approx(angle, abs=1e-12)

@@ -279,10 +279,12 @@ def _assemble_anew(
     env = compiled_model.values.env
     values, initial_rates = initial_conditions(model, env)
     known = dict(values) | driver_positions(model, t, env)
-    compiled_model.follow(initial_turn_angles(compiled_model, known))
+    turned = initial_turn_angles(compiled_model, known)
+    compiled_model.follow(turned)
     drawn = compiled_model.values.q.copy()
     add_whole_turns(compiled_model, known, drawn)
     q, count = _closed_position(model, compiled_model, t, drawn, values, parameters)
+    compiled_model.follow(turned)  # closing may have arrived from the other side: a whole turn away
     compiled_model.at(t, q, compiled_model.values.v)
     if error := undefined_rate_error(compiled_model, t):
         raise error

@@ -252,7 +252,7 @@ def start_time(t_start: float | None, before: Result | None) -> float:
     if before is None:
         return 0.0 if t_start is None else t_start
     if not isinstance(before, Result):
-        raise ModelError(f"start is a result of simulate, not {type(before).__name__}")
+        raise ModelError(f"start is a result of simulate or an equilibrium, not {type(before).__name__}")
     if t_start is not None:
         raise ModelError("a continued motion starts where the result ended: leave out t_start, or start")
     return before.final[0]
