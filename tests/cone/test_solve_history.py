@@ -96,7 +96,7 @@ def test_cuts():
     assert cuts(100)[31:] == [32, 36, 40, 45, 50, 56, 63, 70, 78, 87, 97, 100]
 
 
-@pytest.mark.parametrize("wrong", ["some", 0, True, -3, (0.3, 0.1), (1,), 0.5, ("a", "b")])
+@pytest.mark.parametrize("wrong", ["some", 0, True, -3, (0.3, 0.1), (1,), 0.5])
 def test_wrong_steps_are_refused(wrong):
     with pytest.raises(fb.ModelError, match=r"history of Stepping is .*; give 'all', a number n"):
         fb.Stepping(history=wrong)
@@ -106,3 +106,19 @@ def test_where_a_history_would_do_nothing():
     m = pile()
     with pytest.raises(fb.ModelError, match="no result that would keep history='all'"):
         m.stepper(0.01, method=fb.Stepping(history="all"))
+
+
+def test_times_are_quantities_and_texts_are_short():
+    kept = pile().simulate(0.3, outputs=2, method=options("auto", history=("200 ms", 0.25))).contacts.history
+    assert (kept.t[0], kept.t[-1]) == pytest.approx((0.2, 0.25))
+    assert kept.at("0.23 s").t == kept.at(0.23).t == pytest.approx([0.23])
+    assert len(repr(kept)) < 130 and f"{len(kept)} steps from 0.2 s to 0.25 s" in repr(kept)
+    with pytest.raises(fb.ModelError, match="t: "):
+        kept.at("5 kg")
+    with pytest.raises(fb.ModelError, match="history: unknown name 'a'"):
+        fb.Stepping(history=("a", "b"))
+
+
+def test_a_range_that_the_motion_does_not_reach_is_refused():
+    with pytest.raises(fb.ModelError, match=r"from 0\.5 s to 0\.6 s, and the motion from 0 s to 0\.3 s"):
+        pile().simulate(0.3, method=options("auto", history=(0.5, 0.6)))

@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..analysis_options import seconds
 from ..errors import ModelError
 
 RESIDUALS = {"velocity": "m/s", "force": "1", "primal": "m/s", "complementarity": "J", "energy": "J"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convergence:
     """Residuals of the velocity solves of steps, over the iterations: ``run.contacts.history``.
 
@@ -75,17 +76,26 @@ class Convergence:
         own: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("iteration", *RESIDUALS)}
         return Convergence(self.t[k : k + 1], np.array([0, rows.stop - rows.start]), solver=self.solver, **own)
 
-    def at(self, t: float) -> Convergence:
+    def __repr__(self) -> str:
+        if not len(self):
+            return "<residuals of no contact solve>"
+        last = float(self.velocity[np.asarray(self.begin[1:]) - 1].max())
+        times = f"{self.t[0]:g} s" if len(self) == 1 else f"{len(self)} steps from {self.t[0]:g} s to {self.t[-1]:g} s"
+        most = int(self.iterations.max())
+        return f"<residuals of {times}, solver {self.solver}: at most {most} iterations, {last:.2g} m/s at their ends>"
+
+    def at(self, t: float | str) -> Convergence:
         """The residuals of the recorded step that ends nearest to ``t`` [s].
 
         Raises
         ------
         ModelError
-            If no step was recorded.
+            If no step was recorded, or ``t`` is not a time.
         """
+        t = seconds(t, "t")
         if not len(self):
             raise ModelError("no step with contacts was recorded, so there are no residuals to read")
-        return self[int(np.abs(self.t - float(t)).argmin())]
+        return self[int(np.abs(self.t - t).argmin())]
 
     @property
     def iterations(self) -> np.ndarray:

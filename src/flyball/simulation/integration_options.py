@@ -305,13 +305,21 @@ class Stepping:
         x: Any = self.history
         if x is None or x == ALL_STEPS or (isinstance(x, int) and not isinstance(x, bool) and x > 0):
             return
-        numbers = isinstance(x, (tuple, list)) and all(isinstance(t, (int, float, np.number)) for t in x)
-        if not numbers or len(x) != 2 or not x[0] <= x[1]:
+        times = [seconds(t, "history") for t in x] if isinstance(x, (tuple, list)) else []
+        if len(times) != 2 or not times[0] <= times[1]:
             raise ModelError(
                 f"history of Stepping is {x!r}; give {ALL_STEPS!r}, a number n (every n-th step), or a range of time "
                 "(from, to)"
             )
-        object.__setattr__(self, "history", tuple(float(t) for t in x))
+        object.__setattr__(self, "history", tuple(times))
+
+    def refuse_history_outside(self, start: float, end: float) -> None:
+        """Refuse a range of ``history`` in which a motion has no steps."""
+        if isinstance(self.history, tuple) and not (self.history[0] <= end and start < self.history[1]):
+            raise ModelError(
+                f"history of Stepping is from {self.history[0]:g} s to {self.history[1]:g} s, and the motion from "
+                f"{start:g} s to {end:g} s: no step of it is in that range"
+            )
 
     def bounded(self, longest: float) -> Stepping:
         """Return the options with steps of at most ``longest`` seconds; default steps may still be divided."""

@@ -362,6 +362,7 @@ def simulate_by_impulses(
         If the stepping cannot continue.
     """
     since, part = time.perf_counter(), part or whole_motion()
+    o.refuse_history_outside(*span)
     model = model.snapshot()
     base, scene, stepper, held, chosen = begin_by_impulses(model, span[0], o, parameters, before)
     names = [*scene.carriers.names, "ground"]
