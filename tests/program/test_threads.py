@@ -1,6 +1,7 @@
 """Dense algebra of analyses runs on one thread, whatever the process is set to, and the setting is left as it was."""
 
 import threading
+from functools import cache
 
 import pytest
 from threadpoolctl import ThreadpoolController
@@ -10,11 +11,17 @@ import flyball as fb
 TWO = 2
 
 
-def threads() -> set[int]:
-    """Of all libraries."""
+@cache
+def libraries() -> ThreadpoolController:
+    """All loaded libraries of dense algebra; it takes a while to find them."""
     import scipy.linalg  # noqa: F401
 
-    return {x.num_threads for x in ThreadpoolController().select(user_api="blas").lib_controllers}
+    return ThreadpoolController().select(user_api="blas")
+
+
+def threads() -> set[int]:
+    """Of all libraries."""
+    return {x.num_threads for x in libraries().lib_controllers}
 
 
 @pytest.fixture
