@@ -128,3 +128,17 @@ def test_in_a_part_of_another_mechanism():
 def test_refused(fields, why):
     with pytest.raises(ModelError, match=why):
         mount(**fields)
+
+
+def test_friction_is_none_in_an_equilibrium_and_stiffens_the_linear_model():
+    """Every friction force is one of rest, and it keeps its value; about it dF/dx = -F_m / x_2 on both sides."""
+    mass = 10.0
+    m = fb.Mechanism("mount", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=mass, inertia=1), fb.Prismatic("G", "ground", "a", at=(0, 0), axis=(0, 1)))
+    m.add(fb.Rubber("R", "G.displacement", stiffness=K, **FRICTION))
+    rest = m.equilibrium()
+    assert rest["G.displacement"] == pytest.approx(-mass * 9.81 / K, rel=1e-9)
+    eigenvalues = m.linearize(about=rest).eigenvalues
+    assert np.abs(eigenvalues.imag).max() == pytest.approx(np.sqrt((K + MOST / TRAVEL) / mass), rel=1e-9)
+    run = m.simulate(0.5, start=rest)
+    assert np.abs(run["G.displacement"] - rest["G.displacement"]).max() < 1e-12

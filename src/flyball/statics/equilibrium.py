@@ -166,9 +166,11 @@ def determined_rest(at_rest: Assembly) -> RestState:
         size = np.abs(S).max(axis=axis, keepdims=True, initial=0.0)
         S = S / np.where(size > 0.0, size, 1.0)
     _, d, Vt = np.linalg.svd(S)
-    if len(d) and not d[-1] > SINGULAR_STIFFNESS * d[0]:
-        names = [*(f.names[k].name for k in f.chosen_v), *(x.name for x in s.controls)]
-        weak = names[int(np.argmax(np.abs(Vt[-1])))]
+    states = [x.name for x in s.controls]
+    kept = [name for name, is_kept in zip(states, rest.undetermined_states, strict=True) if is_kept]
+    if kept or (len(d) and not d[-1] > SINGULAR_STIFFNESS * d[0]):
+        names = [*(f.names[k].name for k in f.chosen_v), *states]
+        weak = kept[0] if kept else names[int(np.argmax(np.abs(Vt[-1])))]
         raise SingularityError(
             f"the equilibrium of {s.model.name!r} is not determined along {weak!r}: other positions are equilibria "
             "too, so it has no derivatives; add a spring, a driver or a controller",

@@ -118,14 +118,30 @@ class RestState:
 
     @cached_property
     def K(self):
-        """Scaled stiffness, and derivatives of and by the unknown controller states; sparse."""
+        """Scaled stiffness, and derivatives of and by the unknown controller states; sparse.
+
+        The rows of states that keep their values have only a diagonal entry.
+        """
         import scipy.sparse as sp
 
         e = self.equations
         K = e.by_position[e.at["r"]]
-        if len(self.z):
-            K = sp.bmat([[K, e.by_state[e.at["r"]]], [-e.by_position[e.at["s"]], -e.state_jacobian]]).tocsr()
-        return sp.diags(self.weight) @ K @ sp.diags(self.scale)
+        if not len(self.z):
+            return sp.diags(self.weight) @ K @ sp.diags(self.scale)
+        K = sp.bmat([[K, e.by_state[e.at["r"]]], [-e.by_position[e.at["s"]], -e.state_jacobian]]).tocsr()
+        K = sp.diags(self.weight) @ K @ sp.diags(self.scale)
+        kept = np.r_[np.zeros(len(self.c.sizes)), self.undetermined_states]
+        return (K + sp.diags(kept * np.abs(K.data).max(initial=1e-300))).tocsr()
+
+    @cached_property
+    def undetermined_states(self) -> np.ndarray:
+        """Which unknown controller states have no rate near here, whatever the position: they keep their values, bool.
+
+        Examples are the force of a friction element and an integrator whose input is zero.
+        """
+        e = self.equations
+        rows = abs(e.by_position[e.at["s"]]).sum(axis=1).A1 + np.abs(e.state_jacobian).sum(axis=1)
+        return np.asarray(rows == 0.0)[: len(self.z)]
 
     @cached_property
     def r(self) -> np.ndarray:
