@@ -214,15 +214,17 @@ def test_incomplete_sets_and_contacts_are_refused():
         pack_recording(dataclasses.replace(r, sets=(s, s)))
 
 
-def test_many_jointed_bodies_take_few_commands(opened: Open) -> None:
+@pytest.mark.parametrize("planar", [False, True])
+def test_many_jointed_bodies_take_few_commands(opened: Open, planar: bool) -> None:
     """Bodies with joints are no sets: their solids and symbols are drawn together all the same."""
     t, n = np.linspace(0.0, 1.0, 3), 400
     still = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
     places = [np.tile([k % 20, k // 20, 0.0], (3, 1)) + 0.1 * t[:, None] for k in range(n)]
-    shape = (Shape("box", (0.8, 0.3, 0.3)),)
+    shape = (Shape("box", (0.8, 0.3, 0.3)), Shape("capsule", (0.02, 0.9)))
     bodies = tuple(RecordedBody(f"link {k}", shape, p, still) for k, p in enumerate(places))
-    joints = tuple(RecordedJoint(f"pin {k}", "spherical", f"link {k}", (0.4, 0, 0), (0, 0, 1)) for k in range(n))
-    tab = opened(animation_page(Recording("chain", False, t, bodies, joints=joints)), "t=0&view=top")
+    kind = "revolute" if planar else "spherical"
+    joints = tuple(RecordedJoint(f"pin {k}", kind, f"link {k}", (0.4, 0, 0), (0, 0, 1)) for k in range(n))
+    tab = opened(animation_page(Recording("chain", planar, t, bodies, joints=joints)), "t=0&view=top")
     tab.settle()
     assert tab.evaluate("flyball.drawn().calls") < 20
     for time in (0.0, 1.0):

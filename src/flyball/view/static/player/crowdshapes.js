@@ -1,6 +1,6 @@
 // What many bodies of one shape look like: geometry as fine as their number allows, and paint that shows how they turn.
 import * as THREE from "three";
-import { ORDER, flatMaterial, looksRound, silhouette } from "./flats.js";
+import { ORDER, area, flatMaterial, inset, looksRound, silhouette } from "./flats.js";
 import { placed, solidGeometry } from "./solids.js";
 import { THEMES } from "./theme.js";
 
@@ -95,23 +95,6 @@ function solids(data, count) {
   });
   return { meshes, retheme() {} };
 }
-
-/** An outline moved inwards everywhere by a width. */
-function inset(outline, width) {
-  const n = outline.length;
-  const swept = outline.reduce((sum, p, k) => sum + p.cross(outline[(k + 1) % n]), 0);
-  const around = swept > 0 ? 1 : -1; // anticlockwise or not
-  return outline.map((corner, k) => {
-    const [before, after] = [outline[(k + n - 1) % n], outline[(k + 1) % n]];
-    const inward = [before.clone().sub(corner), corner.clone().sub(after)].map(({ x, y }) =>
-      new THREE.Vector2(y, -x).normalize(),
-    ); // to the left of both edges of an anticlockwise outline, which are gone along backwards
-    const middle = inward[0].clone().add(inward[1]).normalize();
-    return corner.clone().addScaledVector(middle, (around * width) / Math.max(middle.dot(inward[0]), 0.5));
-  });
-}
-
-const area = (outline) => new THREE.ShapeGeometry(new THREE.Shape(outline));
 
 /** In the plane: dark silhouettes, the colour inside of them, and on what is round a stroke that shows how it turns. */
 function flats(data, count, { unit, order }) {

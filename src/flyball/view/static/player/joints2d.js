@@ -24,7 +24,14 @@ function depthInside(point, outline) {
   return depth;
 }
 
+const ON_EDGE = 1e-4; // relative to the unit: a joint on an outline is within the body, whatever rounding makes of it
 const START = { i: 0, j: 0, f: 0 };
+const outlines = new WeakMap(); // shape -> its convex outline in the axes of its body
+
+function convexOutline(shape) {
+  if (!outlines.has(shape)) outlines.set(shape, hull(silhouette(shape)));
+  return outlines.get(shape);
+}
 
 /** The size of a pin: as wanted, but narrow enough for every body that it passes through at the start. */
 function pinRadius(joint, recording, unit) {
@@ -41,11 +48,11 @@ function pinRadius(joint, recording, unit) {
     poseAt(body, START, pose);
     const local = point.clone().sub(pose.position).applyQuaternion(pose.quaternion.invert());
     for (const shape of body.shapes) {
-      const depth = depthInside(at(local.x, local.y), hull(silhouette(shape)));
-      if (depth > 0) radius = Math.min(radius, Math.max(0.6 * depth, 0.006 * unit));
+      const depth = depthInside(at(local.x, local.y), convexOutline(shape));
+      if (depth > -ON_EDGE * unit) radius = Math.min(radius, Math.max(0.6 * depth, 0.006 * unit));
     }
   }
-  return radius;
+  return Number(radius.toPrecision(3)); // equal pins share their geometry
 }
 
 /** The stand of a pin on ground: a triangle on a hatched line; upside down where the body hangs from it. */

@@ -34,7 +34,7 @@ export class Mechanism {
     this.arrows = new Arrows(recording, unit, extent, (rider, out) => this.place(rider, out));
     this.triads = new Triads(recording, unit, this.bodies);
     this.overlay.add(this.arrows.root, this.triads.root);
-    this.batches = recording.planar || FINENESS.fine ? null : new Batches(this.root);
+    this.batches = FINENESS.fine ? null : new Batches(this.root);
     this.seek(recording.t[0]);
   }
 

@@ -1,8 +1,15 @@
 // The drawing kit of planar symbols: discs, areas, lines and hatching, each in a colour of the theme.
 import * as THREE from "three";
 import { flatMaterial, stroke } from "./flats.js";
+import { FINENESS } from "./solids.js";
 
 export const at = (x, y) => new THREE.Vector2(x, y);
+
+const discs = new Map(); // radius -> its geometry, which all discs share
+function discGeometry(radius) {
+  if (!discs.has(radius)) discs.set(radius, new THREE.CircleGeometry(radius, FINENESS.sides(48)));
+  return discs.get(radius);
+}
 
 /** Collects the parts of one symbol, each with the theme's colour that it takes, or a colour of its own. */
 export class Symbol2d {
@@ -16,7 +23,7 @@ export class Symbol2d {
   }
 
   disc(radius, tone, order) {
-    const mesh = new THREE.Mesh(new THREE.CircleGeometry(radius, 48), flatMaterial({}));
+    const mesh = new THREE.Mesh(discGeometry(radius), flatMaterial({}));
     return this.add(Object.assign(mesh, { renderOrder: order }), tone);
   }
 
