@@ -87,8 +87,6 @@ def _check_of_field(f: Field[Any]) -> Check | None:
         return _unless_none(_parameters)
     if f.name == "progress":
         return _progress
-    if f.name == "start" and kind == "Result | None":
-        return _start
     if kind.startswith("Callable"):
         return _unless_none(_function) if optional else _function
     return _unless_none(_mapping) if kind.startswith("Mapping") else _OF_TYPE.get(kind)
@@ -126,20 +124,6 @@ def _mapping(value: Any, name: str) -> Any:
     if not isinstance(value, Mapping) or not all(isinstance(k, str) for k in value):
         raise ModelError(f"{name} maps names to what is given for each, not {value!r}")
     return value
-
-
-def _start(value: Any, _: str) -> Any:
-    """Return the result of an equilibrium, whose only time is where a motion starts."""
-    from .results.equilibrium import Equilibrium
-
-    if not isinstance(value, Equilibrium):
-        return value
-    if value.preload:
-        raise ModelError(
-            f"the equilibrium needs the preload of {', '.join(value.preload)}, which the motion would lack; add "
-            f"x.preload to the laws, and compute the equilibrium without preload="
-        )
-    return value.result
 
 
 def _progress(value: Any, name: str) -> Any:

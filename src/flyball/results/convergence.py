@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..analysis_options import seconds
 from ..errors import ModelError
+from ..model.expressions import number
 
 RESIDUALS = {"velocity": "m/s", "force": "1", "primal": "m/s", "complementarity": "J", "energy": "J"}
 
@@ -92,7 +92,7 @@ class Convergence:
         ModelError
             If no step was recorded, or ``t`` is not a time.
         """
-        t = seconds(t, "t")
+        t = float(number(t, {}, "s", "t"))
         if not len(self):
             raise ModelError("no step with contacts was recorded, so there are no residuals to read")
         return self[int(np.abs(self.t - t).argmin())]

@@ -23,6 +23,7 @@ from ..mobility.mobility import mobility
 from ..model.event import Set
 from ..model.model import Model
 from ..results.diagnostics import undetermined_event_forces, undetermined_loads
+from ..results.equilibrium import Equilibrium
 from ..results.events import MotionStart, energies_at_end
 from ..results.motion_record import extra_turns
 from ..results.result import Result
@@ -239,6 +240,24 @@ class InitialState:
     def earlier_data(self) -> Mapping[str, Any]:
         """Data from the segment before this one; empty if there is none."""
         return self.before.carried if self.part.later and self.before is not None else {}
+
+
+def start_of_motion(start: Result | Equilibrium | None) -> Result | None:
+    """Return the result whose end is the start of a motion; of an equilibrium its result, which has one time.
+
+    Raises
+    ------
+    ModelError
+        If the equilibrium has preloads, which the motion would lack.
+    """
+    if not isinstance(start, Equilibrium):
+        return start
+    if start.preload:
+        raise ModelError(
+            f"the equilibrium needs the preload of {', '.join(start.preload)}, which the motion would lack; add "
+            f"x.preload to the laws, and compute the equilibrium without preload="
+        )
+    return start.result
 
 
 def start_time(t_start: float | None, before: Result | None) -> float:

@@ -26,7 +26,7 @@ from ..results.result import Result
 from ..tables.contact_places import ContactPlaces, contact_places
 from ..tables.element_numbers import element_numbers
 from .diagnosis import InitialOverlap, UnresolvedInstant
-from .initial_state import InitialState, initial_state_at
+from .initial_state import InitialState, initial_state_at, start_of_motion
 from .integration_options import MOST_STEPS, Integration, Stepping
 from .jacobian_pattern import jacobian_layout
 from .solver_switching import AUTO_CODE as EITHER
@@ -266,6 +266,7 @@ class SimulateOptions(Integration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "start", start_of_motion(self.start))
         check_specialize(self.specialize)
         if self.method in IMPLICIT_METHODS:
             refuse_idle_options(self)

@@ -26,7 +26,7 @@ from ..simulation import initial_state
 from ..simulation.events.context import EventContext
 from ..simulation.events.event_loop import integrate_events
 from ..simulation.implicit_integrators import refuse_for_variational
-from ..simulation.initial_state import InitialState, find_initial_state, start_time
+from ..simulation.initial_state import InitialState, find_initial_state, start_of_motion, start_time
 from ..simulation.integration_options import MOST_STEPS, Integration, output_times
 from ..simulation.law_faults import refuse_out_of_table
 from ..simulation.method_choice import (
@@ -128,6 +128,7 @@ class CompareOptions(AnalysisOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "formulations", _checked_names(self.formulations))
+        object.__setattr__(self, "start", start_of_motion(self.start))
         require_count(self.repeats, "repeats", 0)
         if self.step is not None:
             object.__setattr__(self, "step", seconds(self.step, "step"))
