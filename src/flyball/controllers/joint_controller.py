@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import KW_ONLY
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -13,7 +13,7 @@ from pydantic import BeforeValidator
 from ..errors import ModelError
 from ..model.controller import Controller, ControlState
 from ..model.element import Law, Laws, Name, NamedNumbers, element, python_data
-from ..model.expression_parser import SyntaxNode
+from ..model.expression_parser import DEFINED, DEFINITIONS, SyntaxNode
 from ..model.expressions import number
 from ..model.names import curve_parts
 from ..model.units import split_quantity
@@ -31,6 +31,8 @@ Coordinates = Annotated[tuple[str, ...], BeforeValidator(_as_list, json_schema_i
 JointLaws = Annotated[Laws, BeforeValidator(_as_list, json_schema_input_type=Law | Laws)]
 DERIVATIVES = {"reference_rate": "reference", "reference_acceleration": "reference_rate"}
 """Laws that are, if not given, derivatives by time of others."""
+SMOOTH = frozenset(("+", "-", "*", "/", "neg", "sin", "cos", "tanh", "exp"))
+"""Operations without corners where they have a value."""
 MAX_CACHED = 8  # controllers whose formulas are cached for each mechanism
 
 
@@ -148,11 +150,35 @@ class JointController(Controller):
         efforts = wiring.model.cache.get(
             "joint efforts", self, MAX_CACHED, lambda: joint_efforts(wiring.model, self, moving)
         )
-        return with_leaves(efforts[int(k)], leaves)
+        return with_leaves(efforts[int(k)], leaves, {"t", *wiring.model.parameters})
 
 
-def with_leaves(tree: SyntaxNode, leaves: Mapping[str, SyntaxNode]) -> SyntaxNode:
-    """Return the tree with other trees in place of some names."""
+def with_leaves(tree: SyntaxNode, leaves: Mapping[str, SyntaxNode], still: Collection[str]) -> SyntaxNode:
+    """Return the tree with other trees in place of some names.
+
+    A tree that is used several times becomes a definition, which is computed once. The exceptions are trees with
+    corners that depend on names other than ``still`` (time and parameters): the search for the side of such a corner
+    does not look into definitions.
+    """
+    uses = Counter(n.value for n in tree.walk() if n.kind == "name")
+    shared = [x for x, leaf in leaves.items() if uses[x] > 1 and leaf.args and _smooth_in_motion(leaf, still)]
+    replacement = {**leaves, **{x: SyntaxNode(DEFINED, (), k) for k, x in enumerate(shared)}}
+    parts = tree.args if tree.kind == DEFINITIONS else (tree,)
+    placed = [_with_leaves(part, replacement, len(shared)) for part in parts]
+    definitions = (*(leaves[x] for x in shared), *placed)
+    return SyntaxNode(DEFINITIONS, definitions) if len(definitions) > 1 else definitions[0]
+
+
+def _with_leaves(tree: SyntaxNode, leaves: Mapping[str, SyntaxNode], shift: int) -> SyntaxNode:
+    """Replace names in one of the definitions, whose uses are renumbered by ``shift``."""
     if tree.kind == "name":
         return leaves.get(tree.value, tree)
-    return tree.with_args(tuple(with_leaves(a, leaves) for a in tree.args))
+    if tree.kind == DEFINED:
+        return SyntaxNode(DEFINED, (), tree.value + shift)
+    return tree.with_args(tuple(_with_leaves(a, leaves, shift) for a in tree.args))
+
+
+def _smooth_in_motion(tree: SyntaxNode, still: Collection[str]) -> bool:
+    """Whether all functions that may have corners depend only on the names ``still``."""
+    uncertain = (n for n in tree.walk() if n.args and n.kind not in SMOOTH)
+    return all(x.value in still for n in uncertain for x in n.walk() if x.kind == "name")

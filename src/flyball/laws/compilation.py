@@ -547,6 +547,14 @@ class _ProgramWriter:
         self.program: list[int] = []
         self.depth = self.deepest = 0
         self.defined: list[int] = []  # rows of the stack that hold the definitions around the present node
+        self.constants: dict[int, bool] = {}  # id of a node of the tree that is written -> whether it is constant
+
+    def constant(self, node: SyntaxNode) -> bool:
+        """Whether a part of the tree that is written is constant; each part is examined once."""
+        if id(node) not in self.constants:
+            varies = node.kind in (SIDE, DEFINED) or (node.kind == "name" and node.value in self.varying)
+            self.constants[id(node)] = not varies and all([self.constant(arg) for arg in node.args])
+        return self.constants[id(node)]
 
     def emit(self, operation: int, operand: int, grown: int) -> None:
         self.program += [operation, operand]
@@ -555,7 +563,7 @@ class _ProgramWriter:
 
     def write(self, node: SyntaxNode, frozen: bool = False) -> None:
         """Write a node after its arguments; `frozen`: a constant part around it is already marked."""
-        constant = frozen or _constant(node, self.varying)
+        constant = frozen or self.constant(node)
         if node.kind == "number":
             return self.emit(bytecode.CONSTANT, self.slot(float(node.value)), 1)
         if node.kind == SIDE:
