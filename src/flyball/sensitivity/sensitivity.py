@@ -373,14 +373,9 @@ def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
     return _computed_sensitivity(model, o)
 
 
-def _refuse_moving_instants(c: CompiledMechanism, values: Mapping[str, Values], driven: bool) -> None:
-    """Refuse parameters that shift sampling instants, and sampled controllers of a prescribed motion."""
+def _refuse_moving_instants(c: CompiledMechanism, values: Mapping[str, Values]) -> None:
+    """Refuse parameters that shift sampling instants."""
     for e in (e for e in c.structure.model.controllers if e.sampled):
-        if driven:
-            raise ModelError(
-                f"drivers prescribe the motion of {c.structure.model.name!r}, and its sensitivity does not sample "
-                f"{e.title}; leave it out, or have it act on a freedom"
-            )
         for name, x in values.items():
             n = x.numbers[e.name]
             if np.imag(n.period) != 0.0 or np.imag(n.offset) != 0.0:
@@ -468,7 +463,7 @@ def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
     driven, lin = is_fully_driven(base), ConstrainedSystem(x)
     if layer.structure.loads:
         reaction_friction(x, lin.G)
-    _refuse_moving_instants(layer, dict(zip(a.to, values, strict=True)), driven)
+    _refuse_moving_instants(layer, dict(zip(a.to, values, strict=True)))
     if not driven:
         refuse_jumping_laws(a.model, a.to)
         _refuse_kinks(a, e, ())
