@@ -118,6 +118,7 @@ USES = {
     "State": 'fb.State("heat", rate="power - 0.1*heat", initial=0)',
     "StateSpace": 'fb.StateSpace("law", inputs=["A.angle", "A.angle_rate"], D=[[-40, -6]], period="10 ms")',
     "Transfer": 'fb.Transfer("filter", of="A.angle", num=[1], den=[0.01, 1])',
+    "FMU": 'fb.FMU("engine", "engine.fmu", inputs={"speed": "crank.rate"}, period="1 ms")',
     # shapes
     "Box": "fb.Box(edges=(0.3, 0.2, 0.1))",
     "Capsule": "fb.Capsule(radius=0.05, length=0.4)",

@@ -24,6 +24,7 @@ Describe a mechanism
                   WheelOnRail
     vehicles      Tyre on a Road; LinearTyre, FialaTyre, MagicFormula; RoadProfile, RandomRoad, OpenCRG
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
+                  FMU: a unit of another program (FMI 2, 3);
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws,
                   Table2D a surface
@@ -104,6 +105,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import testing as testing
     from .assembly.assembled_state import Assembly as Assembly
     from .controllers.computed_torque import ComputedTorque as ComputedTorque
+    from .controllers.fmu import FMU as FMU
     from .controllers.gravity_compensated_pd import GravityCompensatedPD as GravityCompensatedPD
     from .controllers.integrator import Integrator as Integrator
     from .controllers.lag import Lag as Lag

@@ -20,6 +20,7 @@ ALL = [c for c in Controller.registry.values() if issubclass(c, Controller) and 
 globals().update({c.__name__: c for c in ALL})
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .computed_torque import ComputedTorque as ComputedTorque
+    from .fmu import FMU as FMU
     from .gravity_compensated_pd import GravityCompensatedPD as GravityCompensatedPD
     from .integrator import Integrator as Integrator
     from .lag import Lag as Lag

@@ -31,6 +31,7 @@ from ..engine.kinematics import count_plain_coordinates, retract
 from ..engine.residual import evaluate_residuals
 from ..errors import AnalysisError, ModelError
 from ..laws.bytecode import BY_TIME, evaluate_jet
+from ..laws.python_functions import refuse_function_laws
 from ..numerics.rank import fundamental_subspaces
 from ..tables.coordinate_choice import require_rotor_coordinates
 from ..tables.structure_definition import Structure
@@ -202,7 +203,7 @@ class EquationDerivatives:
     """
 
     def __init__(self, state: MechanismState) -> None:
-        refuse_function_laws(state.c.structure)
+        refuse_function_laws(state.c.structure.functions)
         self.state = state
         s = state.c.structure
         nv, nr, nm = s.nv, len(s.rows), len(s.measured)
@@ -282,6 +283,14 @@ class EquationDerivatives:
     def by_values(self, stepped: Values) -> np.ndarray:
         """Derivatives from parameter values that contain a complex step, (width,)."""
         return complex_step_derivative(self._run(self._steps(1), complex_system(stepped.system))[0])
+
+    def along(self, step: np.ndarray, stepped: Values) -> np.ndarray:
+        """Derivatives (width,) along a change of positions, velocities, accelerations, time, states and parameters.
+
+        ``stepped`` are values that contain a complex step.
+        """
+        steps = 1j * COMPLEX_STEP * step[None].astype(complex)
+        return complex_step_derivative(self._run(steps, complex_system(stepped.system))[0])
 
     def stepped(self, name: str) -> Values:
         """Values of the mechanism with a complex step of one parameter."""
@@ -403,15 +412,6 @@ def prescription_derivatives(x: MechanismState, stepped: Values) -> np.ndarray:
         f, f1, f2 = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
         out.append([-complex_step_derivative(y) for y in (f - S.bodies.offset[b], f1, f2)])
     return np.array(out).reshape(-1, 3).T
-
-
-def refuse_function_laws(s: Structure) -> None:
-    """Refuse laws that are Python functions: they have no derivatives."""
-    if s.functions:
-        raise ModelError(
-            f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
-            f"give a table"
-        )
 
 
 def sparsity_pattern(s: Structure, S: System) -> Any:

@@ -241,6 +241,11 @@ class SampledControllers:
         """Whether something is sampled at t."""
         return bool(any_due(self.plan, t))
 
+    def due_states(self, t: float) -> list[tuple[int, bool]]:
+        """States that are sampled at t, in order of evaluation, and whether they come after all signals."""
+        rows = sorted(self.plan.row.tolist(), key=lambda row: row[IS_LATER])
+        return [(row[SAMPLE_STATE], bool(row[IS_LATER])) for row in rows if is_due(self.plan, row[SAMPLE_CLOCK], t)]
+
     def next(self, times: np.ndarray) -> float:
         """Next instant; infinite if there is none. ``times`` are the output times."""
         return float(matching_output_time(self.plan, times, earliest_instant(self.plan)))

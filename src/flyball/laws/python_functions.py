@@ -12,7 +12,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from inspect import CO_VARARGS
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,7 +22,8 @@ import numpy as np
 
 from ..compiler.formulas import LOCK
 from ..compiler.kernels import short_reason
-from ..errors import ExpressionError, PerformanceNotice, warn_user
+from ..errors import ExpressionError, ModelError, PerformanceNotice, warn_user
+from ..model.controller import FunctionWithMemory
 from ..model.expression_parser import MAX_ARGUMENTS, FunctionCall, function_name
 from .bytecode import COMPILED_FUNCTIONS, STACK_RESERVE
 
@@ -97,7 +98,7 @@ def compile_function(request: FunctionCall) -> CompiledFunction:
                 codes[count] = CompiledFunction(_twin(plain, plain.__globals__, plain.__closure__), count)
                 codes[count].original = ref(plain)
             made = codes[count]
-    if made.reason:
+    if made.reason and not isinstance(plain, FunctionWithMemory):
         _notify_callback(request, plain, made.reason)
     return made
 
@@ -264,6 +265,45 @@ def _notify_callback(request: FunctionCall, function: Any, reason: str) -> None:
     )
 
 
+@contextmanager
+def motion_of(functions: Sequence[CalledFunction], continues: bool) -> Iterator[None]:
+    """Context manager of one motion, for functions that depend on their earlier calls in it.
+
+    Raises
+    ------
+    ModelError
+        If there is such a function and the motion continues an earlier one.
+    """
+    with ExitStack() as stack:
+        for f in functions:
+            if continues and isinstance(f.native.python, FunctionWithMemory):
+                raise ModelError(
+                    f"{f.where}: a motion cannot continue an earlier one with it, since results do not contain its "
+                    f"state; simulate the whole time in one call"
+                )
+        calls = [f.native.python for f in functions]
+        for memory in dict.fromkeys(f.memory for f in calls if isinstance(f, FunctionWithMemory)):
+            stack.enter_context(memory.motion())
+        yield
+
+
+def refuse_function_laws(functions: Sequence[CalledFunction], between_samples: bool = False) -> None:
+    """Refuse laws that are Python functions: they have no derivatives.
+
+    ``between_samples`` allows those that are evaluated at sampling instants only.
+    """
+    with_memory = [f for f in functions if isinstance(f.native.python, FunctionWithMemory)]
+    found = [f for f in functions if not between_samples or f not in with_memory]
+    if not found:
+        return
+    f = found[0]
+    if f in with_memory:
+        raise ModelError(f"{f.where}: it has no derivatives; put a formula in its place, a StateSpace for instance")
+    raise ModelError(
+        f"law {f.text!r} is a Python function, which has no derivatives; write it as an expression or give a table"
+    )
+
+
 class CalledFunction(NamedTuple):
     """A Python function and how a law calls it."""
 
@@ -275,6 +315,8 @@ class CalledFunction(NamedTuple):
     @property
     def title(self) -> str:
         """Description for messages."""
+        if isinstance(self.native.python, FunctionWithMemory):
+            return self.where
         return f"{self.where + ': ' if self.where else ''}the Python function {self.text}"
 
 

@@ -69,6 +69,19 @@ class IMU(Element):
         return {"M": self.frame}
 
 
+class FunctionWithMemory:
+    """Function in laws of controllers that depends on its earlier calls in a motion; it is called back, never compiled.
+
+    Attributes
+    ----------
+    memory : object
+        ``memory.motion()`` is a context manager in which one motion is computed. Functions with equal memories share
+        it.
+    """
+
+    memory: Any
+
+
 OUTPUT = "output"
 """Default name of a single output."""
 
@@ -165,6 +178,10 @@ class Controller(Element):
     def called(self, given: str) -> str:
         """Return the name of an input for messages."""
         return "input" if given == "of" else given
+
+    def signal_units(self) -> dict[str, str]:
+        """Return the SI units of those signals and states whose units are known."""
+        return {}
 
     def signals(self) -> dict[str, str]:
         """Return the formulas of the signals by name, outputs first."""

@@ -102,6 +102,19 @@ NamedNumbers = Annotated[
     BeforeValidator(_pairs, json_schema_input_type=dict[str, Number] | tuple[tuple[str, Number], ...]),
 ]
 """Numbers by names, kept as pairs."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Marker of a field with pairs whose first members are names in another program, not names of parts."""
+
+
+NamedLaws = Annotated[
+    tuple[tuple[str, float | str | Callable[..., Any]], ...],
+    BeforeValidator(_pairs, json_schema_input_type=dict[str, float | str] | tuple[tuple[str, float | str], ...]),
+    Named(),
+]
+"""Laws by names of another program, kept as pairs."""
 Coordinates = Annotated[str | tuple[str, ...], BeforeValidator(_list)]
 """A coordinate such as ``"A.angle"``, or several."""
 Function = Callable[..., Any]

@@ -137,9 +137,9 @@ def refuse_jumping_laws(model: Model, to: Sequence[str]) -> None:
 
 
 def refuse_jumping_rates(model: Model, to: Sequence[str]) -> None:
-    """Refuse such laws for the rates of controllers' states."""
+    """Refuse such laws for the rates of controllers' states; sampled ones act at instants that do not shift."""
     for x in controller_states(model):
-        if by := _deciding_quantity(x.law, model, to):
+        if not x.controller.sampled and (by := _deciding_quantity(x.law, model, to)):
             instead = x.controller.smoother(x.state) or SMOOTH_ALTERNATIVES
             raise ModelError(
                 f"{x.controller.title}: the rate of {x.name!r} decides by {by!r}, so it may jump at an instant that "

@@ -127,6 +127,8 @@ def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
     data = written_fields(e)
     if folder is None:
         return data
+    if isinstance(e, LinkedFile):
+        data["path"] = e.path_from(folder)
     for name in data:
         several = isinstance(data[name], list)
         parts, tables = (x if several else [x] for x in (getattr(e, name), data[name]))

@@ -23,7 +23,7 @@ from .force import BodyForce, CoordinateForce, Force, PathForce, TwoFrameForce, 
 from .joint import ORIENTATION_ANGLES, Coupling, Joint
 from .messages import listing, suggest
 from .names import curve_parts, is_curve
-from .units import split_quantity
+from .units import powers_in_si, split_quantity
 
 if TYPE_CHECKING:
     from .model import Model
@@ -103,7 +103,8 @@ def _quantity_table(model: Model, name: str) -> Table:
     if isinstance(e, IMU):
         return _of_imu(axes)
     if isinstance(e, Controller):
-        return {k: Quantity("", curve=True, array=True) for k in controller_names(model, e)}
+        units = e.signal_units()
+        return {k: Quantity(units.get(k, ""), curve=True, array=True) for k in controller_names(model, e)}
     return {"value": Quantity(_unit_of(model, e.of), curve=True, array=True)} if isinstance(e, Sensor) else {}
 
 
@@ -424,6 +425,17 @@ def _check_set_point(model: Model, e: Controller) -> None:
         table = quantities(model, owner) if model.find(owner) is not None else {}
         if what in table and table[what].unit and split_quantity(told) is not None:
             number(told, {}, table[what].unit, f"{name} of {e.title}")
+
+
+def refuse_other_unit(model: Model, law: Any, unit: str, where: str) -> None:
+    """Refuse a law that is a single curve of another kind than the unit; other expressions have no known unit."""
+    if not isinstance(law, str) or not unit:
+        return
+    owner, what = curve_parts(law, model)
+    table = quantities(model, owner) if model.find(owner) is not None else {}
+    found = table[what or "value"].unit if (what or "value") in table else ""
+    if found and powers_in_si(found) != powers_in_si(unit):
+        raise ModelError(f"{where} is {law!r}, in {found}; it must be in {unit}")
 
 
 def _value_in_units(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:

@@ -19,13 +19,14 @@ from ..errors import ModelError
 from .body import ARRAYS, GROUND, Bodies, Body, Driver, Frame, Ground, Initial, shape_tuple
 from .contact import Contact
 from .controller import IMU, Controller, Sensor
-from .element import Element, LawOf, Unit, fields_with, resolve
+from .element import Element, LawOf, Named, Unit, fields_with, resolve
 from .event import Action, Event, Impulse, Set, comparison_sides
 from .expression_parser import function_name, function_tree, replace_names
 from .expressions import is_number_text
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, WeightedSumForce
 from .geometry import matrix_to_quaternion
 from .joint import Coupling, Joint
+from .linked_files import paths_from
 from .names import curve_parts
 from .placement import Placement, product, rotation_of, scaled, total
 from .quantities import ENERGY, quantities
@@ -36,7 +37,7 @@ from .snapshot import part_owners
 if TYPE_CHECKING:
     from .model import Model
 
-WORDS = ("name", "color", "text", "x_unit", "y_unit", "law", "outputs")
+WORDS = ("name", "color", "text", "x_unit", "y_unit", "law", "outputs", "path")
 """Fields whose texts are no names of parts."""
 SHIFTED = ("rest", "lower", "upper", "notch", "tooth", "middle", "value")
 """Fields that are values of the quantity along which an element acts."""
@@ -55,6 +56,7 @@ def _kinds(cls: Any) -> dict[str, str]:
             out[f.name] = "formulas"
         elif str in types and f.name not in WORDS:
             out[f.name] = "formulas" if float in types or "function" in types else "names"
+    out |= dict.fromkeys(fields_with(cls, Named), "named formulas")
     return out
 
 
@@ -262,9 +264,12 @@ class Subassembly:
         for name in e.local if not isinstance(e, Joint) else ():
             if new.get(name, getattr(e, name)) is not None:
                 new[name] = self._local(name, new.get(name, getattr(e, name)))
-        return dataclasses.replace(e, **{k: x for k, x in new.items() if x != getattr(e, k) or k == "name"})
+        with paths_from(getattr(e, "_folder", None)):
+            return dataclasses.replace(e, **{k: x for k, x in new.items() if x != getattr(e, k) or k == "name"})
 
     def _texts(self, e: Element, value: Any, kind: str) -> Any:
+        if kind == "named formulas":
+            return tuple((name, self.law(x, e)) for name, x in value)
         if isinstance(value, tuple):
             return tuple(self._texts(e, x, kind) for x in value)
         if kind == "formulas":
@@ -305,9 +310,7 @@ class Subassembly:
         """Rename what shapes refer to, and reflect them."""
         made = []
         for shape in shape_tuple(e.shape):
-            texts = {
-                k: self._texts(e, getattr(shape, k), kind) for k, kind in _kinds(type(shape)).items() if k != "path"
-            }
+            texts = {k: self._texts(e, getattr(shape, k), kind) for k, kind in _kinds(type(shape)).items()}
             shape = dataclasses.replace(shape, **{k: x for k, x in texts.items() if x != getattr(shape, k)})
             if self.place.mirror:
                 try:

@@ -32,7 +32,7 @@ from ..linear.operating_point import operating_state
 from ..model.element_laws import refuse_jumping_laws, refuse_jumping_rates
 from ..model.model import Model, listing, suggest
 from ..model.quantities import single_quantity
-from ..model.unsupported_elements import refuse_controllers, refuse_sampled_controllers, refuse_unsupported
+from ..model.unsupported_elements import refuse_controllers, refuse_unsupported
 from ..results.linear_model import sort_branches
 from ..results.result import Result
 from ..results.sensitivity_and_optimum import Sensitivity
@@ -44,6 +44,7 @@ from ..simulation.simulate import clock_for, simulate
 from ..statics.equilibrium import LINEARIZE_DEFAULTS, determined_rest, equilibrium, rest_options
 from ..statics.stability import RestState
 from ..tables.coordinate_choice import rotors
+from ..tables.values import Values
 from .parameter_derivatives import (
     ConstrainedSystem,
     DerivativeRequest,
@@ -368,10 +369,20 @@ def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
         )
     if o.analysis != "motion":
         return _computed_sensitivity(model, o)
-    refuse_sampled_controllers(model, "sensitivity")
-    a = _checked_question(model, o)
-    refuse_jumping_rates(model, a.to)
+    refuse_jumping_rates(model, _checked_question(model, o).to)
     return _computed_sensitivity(model, o)
+
+
+def _refuse_moving_instants(c: CompiledMechanism, values: Mapping[str, Values]) -> None:
+    """Refuse parameters that shift sampling instants."""
+    for e in (e for e in c.structure.model.controllers if e.sampled):
+        for name, x in values.items():
+            n = x.numbers[e.name]
+            if np.imag(n.period) != 0.0 or np.imag(n.offset) != 0.0:
+                raise ModelError(
+                    f"{e.title}: its instants depend on {name!r}, and the sensitivity of a motion does not follow a "
+                    f"shift of instants; take differences of m.simulate(parameters=...)"
+                )
 
 
 def _with_verification(a: DerivativeRequest, analysis: str, out: Sensitivity) -> Sensitivity:
@@ -452,6 +463,7 @@ def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
     driven, lin = is_fully_driven(base), ConstrainedSystem(x)
     if layer.structure.loads:
         reaction_friction(x, lin.G)
+    _refuse_moving_instants(layer, dict(zip(a.to, values, strict=True)))
     if not driven:
         refuse_jumping_laws(a.model, a.to)
         _refuse_kinks(a, e, ())

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..derivatives.equation_derivatives import complex_system, friction_load_rows
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, complex_system, friction_load_rows
 from ..engine import residual
 from ..engine.calls import OutputBuffer
 from ..engine.entry_point import FOLLOW, allocate_work, engine
+from ..engine.sampled_controllers import INSTANT_ROUNDING, SampledControllers
 from ..engine.sensitivity_equations import POWERS, SensitivityPlan, variation_kernel
 from ..errors import SimulationError
 from ..laws.python_functions import clear_faults
@@ -25,6 +26,7 @@ from ..results.health import Health
 from ..results.result import Result
 from ..simulation.diagnosis import failure_reason
 from ..simulation.initial_state import InitialState
+from ..simulation.integration_intervals import sampling
 from ..simulation.prescribed_motion import cumulative_integrals, refined_nodes
 from ..simulation.simulate import run_compiled_loop
 from ..tables.structure_definition import Structure
@@ -141,7 +143,7 @@ class VariationalIntegration:
         sizes: Sequence[float],
         method: str = "dop853",
     ) -> None:
-        self.start, self.clock, self.sizes = start, clock, np.array(sizes, float)
+        self.start, self.clock, self.sizes, self.values = start, clock, np.array(sizes, float), tuple(values)
         c = start.assembly.compiled
         self.c, s, S = c, c.structure, c.values.system
         self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.rows.law), len(values)
@@ -206,14 +208,70 @@ class VariationalIntegration:
         for k, change in enumerate(dc * size):
             clock.y.current[self._places(k + 1)[: self.controls]] = change
         buffer = np.zeros((max(2, min(len(clock.times), OUTPUT_NUMBERS // self.width + 1)), self.width))
-        none = np.zeros((0, self._state_width))
+        none, end = np.zeros((0, self._state_width)), float(clock.real.t_end)
+        sampled = sampling(self.c, self.R, False, (float(clock.real.t), end), (0, 0))
         rows = []
-        while clock.count.status == ex.RUNNING:
-            rows.append(buffer[: self._call(clock, none, buffer)].copy())
-        if clock.count.status != ex.DONE:
-            raise self.stopped(clock)
+        while True:
+            if sampled is not None:
+                if sampled.due(clock.real.t):
+                    self._sample(clock, sampled)
+                clock.real.t_end = min(sampled.next(clock.times), end)
+            used = self._call(clock, none, buffer)
+            if clock.count.status not in (ex.DONE, ex.RUNNING):
+                raise self.stopped(clock)
+            over = clock.count.status == ex.DONE and clock.real.t_end == end
+            if not over and used and buffer[used - 1, 0] == clock.real.t_end:  # written later, with the new held values
+                used -= 1
+                clock.count.next -= 1
+            rows.append(buffer[:used].copy())
+            if over:
+                break
         self.ended = clock
         return self._unpacked(np.concatenate(rows))
+
+    def _sample(self, clock: ex.StepState, sampled: SampledControllers) -> None:
+        """Sample the controllers that are due, and their changes: dz+ = dg/dx dx + dg/dz dz + dg/dp dp.
+
+        Each sampled law g reads the present values of the signals before it; states come last and read all signals.
+        """
+        own, y, at = self.own, clock.y.current, self.nq + self.nv
+        due = sampled.due_states(float(clock.real.t))
+        own.real.t = clock.real.t
+        own.y[0, :at], own.y[0, at:] = y[:at], y[self._places(0)]
+        before = own.y[0, at:].copy()
+        if sampled.sample(self.c.values.system, self.c.work, own) != 0:
+            clock.count.status = ex.STEP_FAILED
+            raise self.stopped(clock)
+        after = own.y[0, at:].copy()
+        y[self._places(0)] = after
+        signals = [state for state, later in due if not later]
+        before[signals] = after[signals]
+        self._change_samples(clock, due, before)
+        clock.count.started = ex.FORCES_JUMPED
+        clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was shortened to end here
+
+    def _change_samples(self, clock: ex.StepState, due: Sequence[tuple[int, bool]], z: np.ndarray) -> None:
+        """Update the changes of sampled states, at signals after and states before the instant, z."""
+        c, y, nv, controls = self.c, clock.y.current, self.nv, self.controls
+        t = float(clock.real.t)
+        t += INSTANT_ROUNDING * abs(t)  # laws that jump at the instant have their later value
+        W = c.work
+        rates = W.velocities.solved.copy(), W.rows.multiplier.copy(), W.velocities.effort.copy()
+        e = EquationDerivatives(MechanismState(c, t, y[: self.nq].copy(), y[self.nq : self.nq + nv].copy(), z, *rates))
+        by_state, signals = e.by_state[e.at["s"]], [k for k, later in due if not later]
+        for k, (x, size) in enumerate(zip(self.values, self.sizes, strict=True)):
+            first = self.nq + nv + 2 * nv * k
+            places = self._places(k + 1)[:controls]
+            dz = y[places] / size
+            old = dz.copy()
+            old[signals] = 0.0
+            step = np.r_[y[first : first + 2 * nv] / size, np.zeros(nv + 1), old]
+            law = e.along(step, x)[e.at["s"]]
+            known: list[int] = []  # signals whose changes are those after the instant
+            for i, later in due:
+                dz[i] = law[i] + by_state[i, known] @ dz[known]
+                known += [] if later else [i]
+            y[places] = dz * size
 
     def at(self, t: np.ndarray, y: np.ndarray) -> MotionSensitivity:
         """Derivatives at states (n, width) of a prescribed motion, with powers in place of works."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..assembly.compiled_mechanism import CompiledMechanism
 from ..compiler.kernels import BoundKernel, JoinedBuffer, PooledBuffer, StructBuffer, StructPool
-from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_system, refuse_function_laws
+from ..derivatives.equation_derivatives import COMPLEX_STEP, complex_system
 from ..engine import residual
 from ..engine.calls import ResidualBatch
 from ..engine.entry_point import initialise_work, zero_work
@@ -14,6 +14,7 @@ from ..engine.fixed_step_methods import AlphaArguments, AlphaWorkspace, alpha_st
 from ..engine.implicit_steps import SIZES, ImplicitArguments, ImplicitWorkspace, JacobianPlan, radau_steps
 from ..engine.kinematics import quaternion_at
 from ..errors import ModelError, SimulationError
+from ..laws.python_functions import refuse_function_laws
 from ..numerics.integrators import implicit_workspace as ds
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import tableau
@@ -67,7 +68,7 @@ class ImplicitIntegrator:
     door, workspace_type, means = radau_steps, ImplicitWorkspace, ImplicitArguments
 
     def __init__(self, c: CompiledMechanism, clock: ex.StepState, index_3: bool = False) -> None:
-        refuse_function_laws(c.structure)
+        refuse_function_laws(c.structure.functions, between_samples=True)
         s, S = c.structure, c.system
         self.clock, self.compiled = clock, c
         self.c, self.stages = GUARD_POINTS, len(GUARD_POINTS)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any, NamedTuple
 
-from ..derivatives.equation_derivatives import refuse_function_laws
 from ..errors import ModelError
+from ..laws.python_functions import refuse_function_laws
 from ..mobility.mobility import mobility
 from ..model.contact import not_for_impulse_stepping
 from ..model.contact_point import Touch
@@ -184,7 +184,7 @@ def reason_against_implicit(start: InitialState) -> str:
     """Return why a motion in these coordinates cannot continue by an implicit method; empty if it can."""
     s = start.assembly.compiled.structure
     try:
-        refuse_function_laws(s)
+        refuse_function_laws(s.functions, between_samples=True)
         _refuse_open_loads(start, RADAU)
     except ModelError as error:
         return str(error).removesuffix("; leave method out, or take the redundancy out")

@@ -17,7 +17,7 @@ from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspec
 from ..engine.stabilization import TIGHT_G, TIGHT_V
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
 from ..laws.breakpoints import NO_BREAKPOINTS
-from ..laws.python_functions import clear_faults, deferred_interrupts
+from ..laws.python_functions import clear_faults, deferred_interrupts, motion_of
 from ..model.model import Model
 from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import Tableau, tableau
@@ -154,7 +154,8 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
     )
     begun.pace.resume_with(begun.earlier_data.get("by", ""))
     follow = o.stabilization == "projection" and not has_guards(begun) and _fully_driven(begun)
-    with progress_bar(o.progress, "simulating") as tell:
+    functions = begun.assembly.compiled.structure.functions
+    with progress_bar(o.progress, "simulating") as tell, motion_of(functions, begun.before is not None):
         result = integrate_motion(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
     if slides:
         remark_friction(result)

@@ -48,6 +48,7 @@ from ...expression_graph.tracing import (
     trace_equations,
     with_prescribed_rows,
 )
+from ...laws.python_functions import refuse_function_laws
 from ...model.contact import has_contact
 from ...model.element_laws import Input, with_inputs
 from ...model.model import Model
@@ -185,11 +186,7 @@ def trace_mechanism(
     model, named = with_inputs(model, inputs)
     model = _with_values(model, changed_parameters or {}).snapshot()
     s = structure(model, Choices(tree=tuple(tree), coupled=bool(tree)))
-    if s.functions:
-        raise ModelError(
-            f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
-            f"give a table"
-        )
+    refuse_function_laws(s.functions)
     graph = Graph()
     given = parameter_symbols(model, graph)
     V = values(s, given)  # type: ignore[arg-type]
