@@ -15,11 +15,11 @@ import numpy as np
 import flyball as fb
 
 RADIUS, LENGTH, DENSITY = 0.012, 0.036, 2700.0  # of the parts: m, m (of the straight piece), kg/m^3
-BIN, TALL, THICK = (0.26, 0.2), 0.14, 0.008  # m: inside of the bin; height and thickness of its walls
+BIN, TALL, THICK = (0.26, 0.2), 0.09, 0.008  # m: inside of the bin; height and thickness of its walls
 HEIGHT, TRAY = 0.32, 0.3  # m: of the fingers' tips while they travel; distance of the tray from the bin along x
 FINGER, OPEN, DEEP = (0.004, 0.014, 0.1), 0.018, 0.004  # m: edges; half the gap; how far the tips go below the axis
 SETTLED = 1.2  # s
-STEP = fb.Stepping(step=2e-3)
+STEP = fb.Stepping(step=2e-3, solver="gauss-seidel")
 
 
 def bin_walls() -> list[fb.Solid]:
@@ -39,8 +39,8 @@ def gantry(m: fb.Mechanism) -> None:
         fb.Body("trolley", mass=1, inertia=(0.01,) * 3, position=(x, 0, z + 0.3), color=steel, shape=fb.Box(edges=(0.06, 0.06, 0.05), looks=True)),
         fb.Body("mast", mass=0.5, inertia=(0.01,) * 3, position=(x, 0, z), color=steel, shape=fb.Box(edges=(0.02, 0.02, 0.4), position=(0, 0, 0.2), looks=True)),
         fb.Body("palm", mass=0.4, inertia=(0.001,) * 3, position=(x, 0, z), color=steel, shape=fb.Box(edges=(0.09, 0.03, 0.02), position=(0, 0, 0.01), looks=True)),
-        fb.Prismatic("x axis", "ground", "bridge", at=(x, 0, z), axis=(1, 0, 0)),
-        fb.Prismatic("y axis", "bridge", "trolley", at=(x, 0, z), axis=(0, 1, 0)),
+        fb.Prismatic("x axis", "ground", "bridge", at=(x, 0, z + 0.3), axis=(1, 0, 0)),
+        fb.Prismatic("y axis", "bridge", "trolley", at=(x, 0, z + 0.3), axis=(0, 1, 0)),
         fb.Prismatic("z axis", "trolley", "mast", at=(x, 0, z), axis=(0, 0, 1)),
         fb.Revolute("wrist", "mast", "palm", at=(x, 0, z), axis=(0, 0, 1)),
     )
@@ -121,3 +121,26 @@ def target(run: fb.Result) -> tuple[int, dict[str, float]]:
     x, y, z = places[k].tolist()
     turn = float(np.arctan2(axis[k, 1], axis[k, 0])) % np.pi - np.pi / 2  # the fingers close across the axis
     return k, {"x": x, "y": y, "low": z - DEEP, "turn": turn}
+
+
+def part_force(run: fb.Result, k: int, t: float) -> tuple[np.ndarray, float]:
+    """Force of the fingers on part ``k`` [N], and the mean of their normal forces, at a time."""
+    table = run.contacts.table()
+    sides = np.stack([table["side_1"], table["side_2"]])
+    now = np.isclose(table["t"], run.t[np.argmin(abs(run.t - t))])
+    pair = now & np.isin(sides, ("left", "right")).any(axis=0) & (sides == f"parts[{k}]").any(axis=0)
+    force = np.stack([table[c][pair] for c in ("fx", "fy", "fz")], axis=1)
+    normal = np.stack([table[c][pair] for c in ("nx", "ny", "nz")], axis=1)
+    sign = np.where(sides[1][pair] == f"parts[{k}]", 1.0, -1.0)
+    return sign @ force, float(abs((force * normal).sum(axis=1)).sum()) / 2
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    folder.mkdir(parents=True, exist_ok=True)
+    m = mechanism()
+    k, place = target(m.simulate(SETTLED, outputs=61, method=STEP))
+    run = m.simulate(6.2, outputs=311, method=STEP, parameters=place)
+    held, press = part_force(run, k, SETTLED + 3.6)
+    print(f"part {k} is lifted to {run['parts'].position[:, k, 2].max():.3f} m; on it: {held.round(2)} N, fingers {press:.2f} N")
+    run.to_html(folder / "bin_picking.html")

@@ -69,3 +69,26 @@ def mechanism(slip: float = 0.3, length: float = 0.9, layers: int = 10, mass: fl
         m.add(fb.Bodies(f"grains {j}", shape=grain, density=2500, position=start[size == j], color=color))
     m.add(fb.Contact(friction=FRICTION))
     return m
+
+
+def means(run: fb.Result, first: float = 1.0) -> dict[str, float]:
+    """Means from the time ``first`` on: forces in weights W of wheel and fork, torque in W R, height of the axle [m]."""
+    late = run.t > first
+    weight = 9.81 * sum(run.model[name].mass for name in ("fork", "wheel"))
+    force = run["wheel"].contact_force[late].mean(axis=0) / weight
+    return {
+        "normal": float(force[1]),
+        "traction": float(force[0]),
+        "pull": float(-run["pull.effort"][late].mean() / weight),
+        "torque": float(-run["motor.effort"][late].mean() / weight / (RADIUS + LUG)),
+        "height": float(run["wheel.y"][late].mean()),
+    }
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    folder.mkdir(parents=True, exist_ok=True)
+    for slip in (0.0, 0.3, 0.6):
+        run = mechanism(slip).simulate(2.4, outputs=481, method=STEP)
+        print(f"slip {slip}:", ", ".join(f"{k} {x:.3f}" for k, x in means(run).items()))
+    run.to_html(folder / "wheel_in_gravel.html")
