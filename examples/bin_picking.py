@@ -35,10 +35,38 @@ def gantry(m: fb.Mechanism) -> None:
     x, z = TRAY, HEIGHT + FINGER[2]
     steel, blue = "#5b6b7c", "#2f6fb7"
     m.add(
-        fb.Body("bridge", mass=2, inertia=(0.02,) * 3, position=(x, 0, z + 0.3), color="#9aa6b3", shape=fb.Box(edges=(0.03, 0.34, 0.03), looks=True)),
-        fb.Body("trolley", mass=1, inertia=(0.01,) * 3, position=(x, 0, z + 0.3), color=steel, shape=fb.Box(edges=(0.06, 0.06, 0.05), looks=True)),
-        fb.Body("mast", mass=0.5, inertia=(0.01,) * 3, position=(x, 0, z), color=steel, shape=fb.Box(edges=(0.02, 0.02, 0.4), position=(0, 0, 0.2), looks=True)),
-        fb.Body("palm", mass=0.4, inertia=(0.001,) * 3, position=(x, 0, z), color=steel, shape=fb.Box(edges=(0.09, 0.03, 0.02), position=(0, 0, 0.01), looks=True)),
+        fb.Body(
+            "bridge",
+            mass=2,
+            inertia=(0.02,) * 3,
+            position=(x, 0, z + 0.3),
+            color="#9aa6b3",
+            shape=fb.Box(edges=(0.03, 0.34, 0.03), looks=True),
+        ),
+        fb.Body(
+            "trolley",
+            mass=1,
+            inertia=(0.01,) * 3,
+            position=(x, 0, z + 0.3),
+            color=steel,
+            shape=fb.Box(edges=(0.06, 0.06, 0.05), looks=True),
+        ),
+        fb.Body(
+            "mast",
+            mass=0.5,
+            inertia=(0.01,) * 3,
+            position=(x, 0, z),
+            color=steel,
+            shape=fb.Box(edges=(0.02, 0.02, 0.4), position=(0, 0, 0.2), looks=True),
+        ),
+        fb.Body(
+            "palm",
+            mass=0.4,
+            inertia=(0.001,) * 3,
+            position=(x, 0, z),
+            color=steel,
+            shape=fb.Box(edges=(0.09, 0.03, 0.02), position=(0, 0, 0.01), looks=True),
+        ),
         fb.Prismatic("x axis", "ground", "bridge", at=(x, 0, z + 0.3), axis=(1, 0, 0)),
         fb.Prismatic("y axis", "bridge", "trolley", at=(x, 0, z + 0.3), axis=(0, 1, 0)),
         fb.Prismatic("z axis", "trolley", "mast", at=(x, 0, z), axis=(0, 0, 1)),
@@ -59,7 +87,7 @@ def gantry(m: fb.Mechanism) -> None:
 
 
 def mechanism(count: int = 40, force: float = 4.0, friction: float = 0.5) -> fb.Mechanism:
-    """``count`` parts fall into the bin; the gantry then goes to the point ``x``, ``y``, ``low`` and turns by ``turn``."""
+    """``count`` parts fall into the bin; then the gantry goes to ``x``, ``y``, ``low`` and turns by ``turn``."""
     times = {"go": SETTLED, "down": SETTLED + 0.8, "shut": SETTLED + 1.6, "up": SETTLED + 1.8, "back": SETTLED + 2.6}
     times |= {"free": SETTLED + 4.2}
     place = {"x": 0.0, "y": 0.0, "low": TALL, "turn": 0.0, "F": force, "tray": TRAY, "high": HEIGHT}
@@ -71,14 +99,18 @@ def mechanism(count: int = 40, force: float = 4.0, friction: float = 0.5) -> fb.
     )
     pitch, rng, k = LENGTH + 2.3 * RADIUS, np.random.default_rng(1), np.arange(count)
     row, column = int(BIN[0] / pitch), int(BIN[1] / pitch)
-    start = pitch * np.stack([k % row - (row - 1) / 2, k // row % column - (column - 1) / 2, k // (row * column) + 0.6], axis=1)
+    start = pitch * np.stack(
+        [k % row - (row - 1) / 2, k // row % column - (column - 1) / 2, k // (row * column) + 0.6], axis=1
+    )
     turn = rng.normal(size=(count, 4))
     turn /= np.linalg.norm(turn, axis=1)[:, None]
     part = fb.Capsule(radius=RADIUS, length=LENGTH)
     m.add(fb.Bodies("parts", shape=part, density=DENSITY, position=start, orientation=turn, color="#e5862b"))
     gantry(m)
     m.add(
-        fb.Driver("along", "x axis.displacement", "(x - tray)*(step5(t, go, 0, down, 1) - step5(t, back, 0, back + 0.8, 1))"),
+        fb.Driver(
+            "along", "x axis.displacement", "(x - tray)*(step5(t, go, 0, down, 1) - step5(t, back, 0, back + 0.8, 1))"
+        ),
         fb.Driver("across", "y axis.displacement", "y*(step5(t, go, 0, down, 1) - step5(t, back, 0, back + 0.8, 1))"),
         fb.Driver("turning", "wrist.angle", "turn*step5(t, go, 0, down, 1)"),
         fb.Driver(
@@ -142,5 +174,8 @@ if __name__ == "__main__":
     k, place = target(m.simulate(SETTLED, outputs=61, method=STEP))
     run = m.simulate(6.2, outputs=311, method=STEP, parameters=place)
     held, press = part_force(run, k, SETTLED + 3.6)
-    print(f"part {k} is lifted to {run['parts'].position[:, k, 2].max():.3f} m; on it: {held.round(2)} N, fingers {press:.2f} N")
+    height = run["parts"].position[:, k, 2].max()
+    print(
+        f"part {k} is lifted to {height:.3f} m; the fingers' force on it: {held.round(2)} N, each presses {press:.2f} N"
+    )
     run.to_html(folder / "bin_picking.html")

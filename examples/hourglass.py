@@ -1,14 +1,15 @@
 """An hourglass: grains run through its neck at a constant rate, which grows with the neck by Beverloo's law.
 
-Grains of diameter d, n of them per area or volume, pass a neck of breadth D at C n sqrt(g) (D - k d)^(3/2) per second in
-the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike that
-of water the rate does not depend on the height of filling: the grains above a neck carry each other like an arch, and
+Grains of diameter d, n of them per area or volume, pass a neck of breadth D at C n sqrt(g) (D - k d)^(3/2) per second
+in the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike the
+rate of water it does not depend on the height of filling: the grains above a neck carry each other like an arch, and
 below it they fall freely.
 
 Run it with ``python examples/hourglass.py out``: it prints the rates, and writes a page with the animation.
 """
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -32,17 +33,20 @@ def panel(low: tuple[float, float], high: tuple[float, float], way: float, wide:
     (x, y), (dx, dy) = low, np.subtract(high, low)
     out = THICK * np.array([abs(dy), -dx * np.sign(dy)]) / np.hypot(dx, dy)
     corners = [(x, y), high, (x + out[0], y + out[1]), (high[0] + out[0], high[1] + out[1])]
-    return fb.Hull(vertices=[r * e + (0, h, 0) + s * max(wide * r, GRAIN / 2) * across for r, h in corners for s in (-1, 1)])
+    return fb.Hull(
+        vertices=[r * e + (0, h, 0) + s * max(wide * r, GRAIN / 2) * across for r, h in corners for s in (-1, 1)]
+    )
 
 
 def glass(neck: float, radius: float, tall: float, planar: bool) -> list[fb.Solid]:
     """The walls of both chambers, and the floor of the lower one; the neck is at height 0."""
     n = 2 if planar else PANELS
+    wide = 0 if planar else np.tan(np.pi / n)
     rise = STEEP * (radius - neck / 2)
     outline = [(neck / 2, 0.0), (radius, rise), (radius, tall)]
     walls = [
-        panel((a[0], side * a[1]), (b[0], side * b[1]), 2 * np.pi * k / n, 0 if planar else np.tan(np.pi / n))
-        for a, b in zip(outline, outline[1:], strict=False)
+        panel((a[0], side * a[1]), (b[0], side * b[1]), 2 * np.pi * k / n, wide)
+        for a, b in pairwise(outline)
         for side in (1, -1)
         for k in range(n)
     ]

@@ -30,9 +30,15 @@ def drum(radius: float) -> list[fb.Solid]:
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
     side = 2 * (radius + GRAIN) * np.tan(np.pi / SIDES)
     return [
-        fb.Box(edges=(thick, wide, 2 * GRAIN), position=(r * np.cos(a), r * np.sin(a), 0), orientation=(np.cos(a / 2), 0, 0, np.sin(a / 2)))
+        fb.Box(
+            edges=(thick, wide, 2 * GRAIN),
+            position=(r * np.cos(a), r * np.sin(a), 0),
+            orientation=(np.cos(a / 2), 0, 0, np.sin(a / 2)),
+        )
         for k, a in enumerate(angle)
-        for thick, wide, r in [(GRAIN, side, radius + GRAIN / 2), (GRAIN, GRAIN / 2, radius - GRAIN / 4)][: 1 + (k % 3 == 0)]
+        for thick, wide, r in [(GRAIN, side, radius + GRAIN / 2), (GRAIN, GRAIN / 2, radius - GRAIN / 4)][
+            : 1 + (k % 3 == 0)
+        ]
     ]
 
 
@@ -62,7 +68,9 @@ def mechanism(friction: float = 0.4, rolling: float = 0.0, radius: float = 0.15,
 
 def mass_centre(run: fb.Result) -> tuple[np.ndarray, float]:
     """Mass centre of all grains, (times, 2) [m], and their mass [kg]."""
-    mass = np.concatenate([np.full(len(s.position), DENSITY * 4 / 3 * np.pi * s.shape.radius**3) for s in run.model.bulk])
+    mass = np.concatenate(
+        [np.full(len(s.position), DENSITY * 4 / 3 * np.pi * s.shape.radius**3) for s in run.model.bulk]
+    )
     places = np.concatenate([run[s.name].position[..., :2] for s in run.model.bulk], axis=1)
     return np.einsum("tnj,n->tj", places, mass) / mass.sum(), float(mass.sum())
 

@@ -23,16 +23,16 @@ FRICTION, SPEED, REST = 0.5, 3.0, 0.6  # of grains; turning speed [rad/s]; time 
 STEP = fb.Stepping(step=1e-3, solver="gauss-seidel")
 
 
-def wheel() -> list[fb.Solid]:
+def wheel(breadth: float = GRAIN) -> list[fb.Solid]:
     """A disc with lugs."""
     angle = 2 * np.pi * np.arange(LUGS) / LUGS
     r = RADIUS + LUG / 2
-    lug = {"edges": (LUG, 0.6 * LUG, GRAIN)}
+    lug = {"edges": (LUG, 0.6 * LUG, breadth)}
     lugs = [
         fb.Box(**lug, position=(r * np.cos(a), r * np.sin(a), 0), orientation=(np.cos(a / 2), 0, 0, np.sin(a / 2)))
         for a in angle
     ]
-    return [fb.Cylinder(radius=RADIUS, length=GRAIN), *lugs]
+    return [fb.Cylinder(radius=RADIUS, length=breadth), *lugs]
 
 
 def bed(length: float, layers: int) -> np.ndarray:
@@ -54,9 +54,25 @@ def mechanism(slip: float = 0.3, length: float = 0.9, layers: int = 10, mass: fl
     floor = fb.Box(edges=(length + 2 * GRAIN, GRAIN, GRAIN), position=(length / 2, -GRAIN / 2, 0))
     m.add(
         fb.Ground("trough", shape=[floor, *walls], color="#5b6770"),
-        fb.Body("carriage", mass=0.1, inertia=1e-4, position=(x, y), shape=fb.Box(edges=(0.06, 0.02, 0.01), position=(0, 0.17, 0), looks=True), color="#9aa6b3"),
-        fb.Body("fork", mass=0.1 * mass, inertia=1e-5, position=(x, y), shape=fb.Box(edges=(0.016, 0.2, 0.01), position=(0, 0.09, 0.012), looks=True), color="#5b6b7c"),
-        fb.Body("wheel", mass=0.9 * mass, inertia=0.45 * mass * RADIUS**2, position=(x, y), shape=wheel(), color="#2f6fb7"),
+        fb.Body(
+            "carriage",
+            mass=0.1,
+            inertia=1e-4,
+            position=(x, y),
+            shape=fb.Box(edges=(0.06, 0.02, 0.01), position=(0, 0.17, 0), looks=True),
+            color="#9aa6b3",
+        ),
+        fb.Body(
+            "fork",
+            mass=0.1 * mass,
+            inertia=1e-5,
+            position=(x, y),
+            shape=fb.Box(edges=(0.016, 0.2, 0.01), position=(0, 0.09, 0.012), looks=True),
+            color="#5b6b7c",
+        ),
+        fb.Body(
+            "wheel", mass=0.9 * mass, inertia=0.45 * mass * RADIUS**2, position=(x, y), shape=wheel(), color="#2f6fb7"
+        ),
         fb.Prismatic("rail", "ground", "carriage", at=(x, y), axis=(1, 0)),
         fb.Prismatic("guide", "carriage", "fork", at=(x, y), axis=(0, 1)),
         fb.Revolute("axle", "fork", "wheel", at=(x, y)),
@@ -72,7 +88,7 @@ def mechanism(slip: float = 0.3, length: float = 0.9, layers: int = 10, mass: fl
 
 
 def means(run: fb.Result, first: float = 1.0) -> dict[str, float]:
-    """Means from the time ``first`` on: forces in weights W of wheel and fork, torque in W R, height of the axle [m]."""
+    """Means from a time on: forces in weights W of wheel and fork, torque in W R, height of the axle [m]."""
     late = run.t > first
     weight = 9.81 * sum(run.model[name].mass for name in ("fork", "wheel"))
     force = run["wheel"].contact_force[late].mean(axis=0) / weight
