@@ -86,6 +86,7 @@ NOT_CONVERTED = {
     **dict.fromkeys(("cam_follower.toml", "gear_backlash.toml"), "play with weights"),
     **dict.fromkeys(("clock_escapement.toml", "geneva_drive.toml", "safety_brake.toml"), "events set parameters"),
     **dict.fromkeys(("dominoes.py", "pile_in_a_box.py", "silo.py", "wrecking_ball.py"), "sets of bodies"),
+    **dict.fromkeys(("bin_picking.py", "hourglass.py", "rotating_drum.py", "wheel_in_gravel.py"), "sets of bodies"),
     "bogie_on_rollers.py": "laws of wheels on rails",
     "excavator.py": "laws of linear actuators",
     **dict.fromkeys(("bogie.py", "differential.py", "planetary.py"), "sensors of angular velocities"),

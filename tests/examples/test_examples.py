@@ -10,16 +10,20 @@ from tests.mechanisms import EXAMPLES
 
 EVERY = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
 CONTACT = {  # see test_contact_examples
+    "bin_picking.py",  # and verification/test_granular, as the other granular ones
     "conveyor.toml",
     "dominoes.py",
     "gripper.py",
+    "hourglass.py",
     "labyrinth.py",
     "newtons_cradle.py",
     "pile_in_a_box.py",
     "rocking_block.toml",  # and test_events
+    "rotating_drum.py",
     "silo.py",  # and verification/test_silo
     "tippe_top.py",
     "tracked_vehicle.py",  # verification/test_tracks
+    "wheel_in_gravel.py",
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
