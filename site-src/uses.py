@@ -60,6 +60,14 @@ USES = {
     "Detent": 'fb.Detent("notches", "A.angle", pitch="30 deg", holding="2 N*m")',
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
+    "EngineMap": (
+        'fb.EngineMap("engine", "crank", speeds=(500, 1500, 2500), speed_unit="rpm", throttles=(0, 0.5, 1), '
+        'torques=((-60, 300, 500), (-90, 400, 800), (-150, 250, 600)), throttle="driver.throttle", idle="600 rpm")'
+    ),
+    "GearBox": (
+        'fb.GearBox("box", "crank.angle", "shaft.angle", ratios=(5.3, 2.5, 1.4, 1), capacity="1500 N*m", '
+        'up="2200 rpm", down="900 rpm")'
+    ),
     "Tyre": (
         'fb.Tyre("tyre", "ground", "a", at=(0, 0, 0.3), model=fb.LinearTyre(radius=0.3, stiffness=2e5, '
         "nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4))"

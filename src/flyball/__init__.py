@@ -22,7 +22,8 @@ Describe a mechanism
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, Rubber, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque,
                   WheelOnRail
-    vehicles      Tyre on a Road; LinearTyre, FialaTyre, MagicFormula; RoadProfile, RandomRoad, OpenCRG
+    vehicles      Tyre on a Road; LinearTyre, FialaTyre, MagicFormula; RoadProfile, RandomRoad, OpenCRG; EngineMap,
+                  GearBox; SpeedDriver, PathDriver
     controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them;
                   FMU: a unit of another program (FMI 2, 3);
                   ComputedTorque, GravityCompensatedPD: of a robot's joints, with its equations of motion

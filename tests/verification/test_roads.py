@@ -163,7 +163,7 @@ def test_a_quarter_car_follows_its_transfer_function(f):
 
 def test_a_road_that_ends_stops_the_motion_by_name():
     surface = fb.RoadProfile(heights=[0.0] * 60, spacing=0.1, start=-2.0)
-    with pytest.raises(fb.SimulationError, match=r"Tyre 'tyre'.*road ends"):
+    with pytest.raises(fb.SimulationError, match=r"Tyre 'tyre'.*'road' ends before x = 3.9"):
         rig(surface).simulate(3.0)
     run = rig(surface, beyond="hold").simulate(3.0)
     assert run["tyre"].load[-1] == pytest.approx(440.0 * 9.81, rel=1e-3)

@@ -24,7 +24,9 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .gravity_compensated_pd import GravityCompensatedPD as GravityCompensatedPD
     from .integrator import Integrator as Integrator
     from .lag import Lag as Lag
+    from .path_driver import PathDriver as PathDriver
     from .pid import PID as PID
+    from .speed_driver import SpeedDriver as SpeedDriver
     from .state import State as State
     from .state_space import StateSpace as StateSpace
     from .transfer import Transfer as Transfer

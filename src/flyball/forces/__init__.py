@@ -4,8 +4,9 @@
 carry `formula`; a class without ``inputs`` inherits zeros. ``placed`` returns its frames if it is given by points; the
 base classes have one, with the world's axes (pattern of another: `bushing`). ``on_points`` returns whether it may act
 on a point mass. ``fails`` ends the message about a force that is no number: it says the
-remedy. All compiled mechanics is compiled again. Samples in tests: ``contract/test_forces.py``, ``robust/forces.py``,
-and in the mechanisms with every force of ``contract/test_everything.py`` and ``identities/test_complex_values.py``.
+remedy; ``failure`` returns it, where it depends on the state. All compiled mechanics is compiled again. Samples in
+tests: ``contract/test_forces.py``, ``robust/forces.py``, and in the mechanisms with every force of
+``contract/test_everything.py`` and ``identities/test_complex_values.py``.
 """
 
 import importlib
@@ -80,6 +81,8 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .clutch import Clutch as Clutch
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
     from .detent import Detent as Detent
+    from .engine_map import EngineMap as EngineMap
+    from .gear_box import GearBox as GearBox
     from .joint_friction import JointFriction as JointFriction
     from .limit import Limit as Limit
     from .motor import Actuator as Actuator

@@ -55,6 +55,7 @@ PASSES = 3  # for the contact point on a road that is not plane
 MOST_POINTS = 64
 PI = 3.141592653589793
 CREEP = 0.01  # of the low speed: below it, a wheel counts as standing
+FLAT = 1e-6  # sine of the angle between axis and normal below which the wheel lies flat
 DAMPING = 0.05  # of slip stiffness over low speed: the damper at standstill
 
 
@@ -236,15 +237,31 @@ class Tyre(TwoFrameForce):
         "rolling_resistance": "N*m", "aligning_moment": "N*m", "slip": "1", "slip_angle": "rad", "camber": "rad",
         "deflection": "m", "rolling_radius": "m", "contact_x": "m", "contact_y": "m", "contact_z": "m",
     }  # fmt: skip
-    fails: ClassVar[str] = (
-        "There is no road below it: the road ends there, has no height, or the wheel's centre is beneath it. Make the "
-        'road longer, give it beyond="hold", place the wheel above it, or end the motion earlier; or its numbers are '
-        "too large"
-    )
 
     def needs(self) -> str:
         """Return the road, for its friction; ground has none of its own."""
         return "" if self.body_i == GROUND else self.body_i
+
+    def failure(self, par: Any, F: Any, M: Any, surfaces: Any) -> str:
+        """Return whether the wheel lies flat, there is no road below it, or its centre is beneath the road."""
+        if float(np.hypot(*mtv(F[1], col(M[1], 1))[:2])) < FLAT:
+            return (
+                f"The wheel lies flat on {self.body_i!r}: its axis is along the road's normal, so that it has no "
+                f"line of rolling. The axis is y of {self.body_j!r}, or axis= with at="
+            )
+        x, y = (float(v) for v in mtv(F[1], sub(M[0], F[0]))[:2])
+        height = float(contact(par, F, M, (), surfaces)[4])
+        if math.isnan(height):
+            return (
+                f"There is no road below the wheel: {self.body_i!r} ends before x = {x:.4g} m, y = {y:.4g} m (along "
+                'its axes), or has no height there. Make it longer, give it beyond="hold", or end the motion earlier'
+            )
+        if height < 0.0:
+            return (
+                f"The centre of the wheel is {-height:.4g} m beneath {self.body_i!r}: the road is on the side to which "
+                "its z axis points. Place the wheel there, or turn the road over"
+            )
+        return self.fails
 
     def states(self) -> tuple[str, ...]:
         """Return the deflections of the contact patch."""

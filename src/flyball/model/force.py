@@ -56,6 +56,10 @@ class Force(Element):
     sampled: ClassVar[bool] = False  # its states have rates, as those of a continuous controller
     fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 
+    def failure(self, par: Any, F: Any, M: Any, surfaces: Any) -> str:
+        """Return why its formulas return no number at these frames, and the remedy."""
+        return self.fails
+
     def ends(self) -> dict[str, str]:
         """Return role of each of its frames -> its body or frame."""
         raise NotImplementedError

@@ -203,6 +203,26 @@ def tyre_warnings(result: Result) -> list[str]:
     return found
 
 
+def lifted_wheel_warnings(result: Result) -> list[str]:
+    """Return a warning for each tyre without load at some output times: when, and how far it is from its road."""
+    found = []
+    for e in (x for x in result.values.structure.forces if hasattr(x, "model")):
+        curves = result[e.name]
+        lifted = curves.load <= 0.0
+        if not lifted.any():
+            continue
+        edges = np.flatnonzero(np.diff(np.r_[False, lifted, False]))
+        times = [f"t = {result.t[a]:.4g} to {result.t[b - 1]:.4g} s" for a, b in edges.reshape(-1, 2).tolist()]
+        more = f" and {len(times) - MOST_LIFTS} more times" if len(times) > MOST_LIFTS else ""
+        found.append(
+            f"{e.title}: wheel {e.body_j!r} is in the air from {', '.join(times[:MOST_LIFTS])}{more}, up to "
+            f"{-float(curves.deflection[lifted].min()):.3g} m above the road"
+        )
+    return found
+
+
+MOST_LIFTS = 3  # intervals in the air that a warning lists
+
 APPROACH_GROWTH = 2.0  # growth of the fastest velocity over the times that are examined
 APPROACH_FIT = 0.05  # allowed deviation of 1 / v^2 from a line, relative to its first value
 APPROACH_OUTPUTS = 5  # least number of output times among them
@@ -411,6 +431,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
         *_creep_warnings(result),
         *transverse_slip_warnings(result),
         *tyre_warnings(result),
+        *lifted_wheel_warnings(result),
         *singular_passage_warnings(result),
         lock_up_warning(result),
         *pull_warnings(result),

@@ -474,7 +474,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
             else:
                 out = np.ravel(e.wrench_between(par, F, M, tuple(laws), (x, y), S.const))
             if not np.isfinite(out).all():
-                return f"the force of {e.title} is no number. {e.fails}"
+                return f"the force of {e.title} is no number. {e.failure(par, F, M, S.surfaces)}"
     return ""
 
 

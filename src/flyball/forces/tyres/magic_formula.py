@@ -22,7 +22,7 @@ from ...model.expressions import number
 from ...model.linked_files import FilePath, LinkedFile
 from ...model.messages import suggest
 from .tir_files import OTHER_NAMES, OWN_NAMES, RANGE_NAMES, RANGES, TyreData, completed, read_tir
-from .tyre_model import LEAST_RELAXATION, RADIUS, STIFFNESS, TyreModel, damped_load
+from .tyre_model import LEAST_RELAXATION, RADIUS, STIFFNESS, TyreModel, damped_load, spin_direction
 
 KIND = 2
 (
@@ -45,7 +45,6 @@ KIND = 2
 SMALL = 1e-6  # of the nominal load: added to a peak or a stiffness that may be zero
 DEGRESSIVE = 10.0  # A_mu of equation 4.E8
 PEAK = 2.5  # slip, relative to peak over stiffness, beyond which the force has no use of more deflection
-REST = 0.1  # m/s: speed below which the rolling resistance falls to zero
 TWO_BY_PI = 0.6366197723675814
 
 
@@ -221,17 +220,17 @@ def overturning(data, at, fy, camber, load):
 
 
 @formula
-def rolling(data, at, fx, camber, load, speed):
-    """Return the rolling resistance (4.E70): a moment against the rolling."""
+def rolling(data, at, fx, camber, load, motion):
+    """Return the rolling resistance (4.E70): a moment against the turning of the wheel."""
     nominal, _, _ = reference(data, at, load)
-    pace = absolute(speed) / data[at + LONGVL]
+    pace = absolute(motion[1]) / data[at + LONGVL]
     part = load / nominal
     m = data[at + QSY1] + data[at + QSY2] * fx / nominal + data[at + QSY3] * pace
     m = m + data[at + QSY4] * integer_power(pace, 4) + (data[at + QSY5] + data[at + QSY6] * part) * camber * camber
     grown = power(maximum(part, 0.0 * part + SMALL), data[at + QSY7] + 0.0 * part)
-    way = speed / sqrt(speed * speed + REST * REST)
+    sense = spin_direction(data[at + RADIUS], motion)
     pressure = power(data[at + PRESSURE], data[at + QSY8])
-    return -data[at + RADIUS] * nominal * m * grown * pressure * data[at + LMY] * way
+    return -data[at + RADIUS] * nominal * m * grown * pressure * data[at + LMY] * sense
 
 
 @formula
@@ -276,7 +275,7 @@ def relaxation(data, at, friction, load, camber):
 @formula
 def slip_forces(data, at, friction, slip, tangent, camber, load, motion):
     """Return forces and moments of combined slip; see the module's docstring."""
-    along, speed, _ = motion
+    along = motion[0]
     legacy = data[at + LEGACY]
     _, df, _ = reference(data, at, load)
     a = choose(legacy, atan(tangent), tangent)
@@ -290,7 +289,7 @@ def slip_forces(data, at, friction, slip, tangent, camber, load, motion):
     upright = straight * lateral_weight(data, at, slip, a, 0.0 * camber, df)
     on_trail = choose(legacy, weighted, upright)
     mz = aligning(data, at, friction, slip, a, gz, load, along, (fx, fy), (on_trail, bc, h, v))
-    return fx, fy, overturning(data, at, fy, camber, load), rolling(data, at, fx, camber, load, speed), mz
+    return fx, fy, overturning(data, at, fy, camber, load), rolling(data, at, fx, camber, load, motion), mz
 
 
 @element

@@ -121,11 +121,25 @@ REST = 0.1  # m/s: speed below which the rolling resistance falls to zero
 @formula
 def rolling_direction(motion):
     """Return the direction of travel: 1 forwards, -1 backwards, and smooth in between, near standstill."""
-    speed = motion[1]
+    return smooth_sign(motion[1])
+
+
+@formula
+def spin_direction(radius, motion):
+    """Return the sense in which the wheel turns, of which rolling resistance is the reverse: it heats a tyre that
+    turns, not one that slides locked.
+    """
+    return smooth_sign(radius * motion[2])
+
+
+@formula
+def smooth_sign(speed):
+    """Return the sign of a speed, smooth below `REST`."""
     return speed / sqrt(speed * speed + REST * REST)
 
 
 @formula
 def rolling_moment(data, at, load, motion):
-    """Return the moment about the lateral axis: minus the coefficient times load and radius, against the rolling."""
-    return -data[at + ROLLING] * load * data[at + RADIUS] * rolling_direction(motion)
+    """Return the moment about the lateral axis: minus the coefficient times load and radius, against its turning."""
+    radius = data[at + RADIUS]
+    return -data[at + ROLLING] * load * radius * spin_direction(radius, motion)
