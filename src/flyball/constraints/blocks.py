@@ -26,6 +26,7 @@ from . import (
     rotation_component,
     skew_lines,
     space_curve,
+    tangent,
 )
 from .registry import BY_ADDRESS, KINDS, Kind
 
@@ -220,3 +221,6 @@ def turning(axis: str) -> Row:
 
 DISTANCE = Row(distance.KIND, (0.0,) * 7 + (1.0,))
 """Measured: distance of the origins of F and M."""
+
+TANGENT = Row(tangent.KIND, (0.0,) * 7 + (1.0,))
+"""Measured: length of the tangent of two circles, with the change of the arcs on them; see `tangent`."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..compiler.formulas import formula
 from ..constraints.switches.elastic_stop import ELASTIC
@@ -16,10 +16,26 @@ from ..errors import ModelError
 from ..math.scalar import choose, maximum
 from ..model.body import Body, Driver
 from ..model.contact import check_restitution
-from ..model.element import Damping, Element, Law, LawOf, Length, Ratio, Stiffness, element, nonnegative
+from ..model.element import (
+    Damping,
+    Direction,
+    Element,
+    Law,
+    LawOf,
+    Length,
+    Numbers,
+    Points,
+    Ratio,
+    Stiffness,
+    Unit,
+    element,
+    nonnegative,
+)
 from ..model.force import PathForce, Switch, check_elastic
+from ..model.joint import WorldFrame
 from .limit import Limit, stop_switch_numbers
 from .motor import LITTLE
+from .rope_geometry import drawn_rope, is_backward, is_point, pulley_axes
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -65,6 +81,41 @@ class LengthLimit(Limit):
 
 
 @element
+class PulleyLimit(LengthLimit):
+    """The largest length of a rope over pulleys: the sum of its straight parts and of the arcs."""
+
+    at: Points = ()
+    radii: Annotated[Numbers, Unit("m")] = ()
+    turns: Annotated[Numbers, Unit("1")] = ()
+    axis: Direction | None = None
+    fixed: tuple[int, ...] = ()  # straight parts of constant length, which the sum does not contain
+
+    in_files: ClassVar[bool] = False
+
+    def derive(self, n: SimpleNamespace, env: Any) -> None:
+        """Add the length as drawn, and its excess over the sum of the coordinates."""
+        x = drawn_rope(self, n)
+        n.drawn = sum(x.lengths) + x.arcs(n.radii)
+        parts = zip(x.lengths, x.places, pairwise(n.radii), strict=True)
+        n.excess = n.drawn - sum(
+            length - (b - a) * place for k, (length, place, (a, b)) in enumerate(parts) if k not in self.fixed
+        )
+        if n.upper is None:
+            n.upper = n.drawn
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Require what a rope requires, which was checked with it."""
+
+    def total(self, n: SimpleNamespace) -> Any:
+        """Return the value of the sum at which the length is zero."""
+        return -n.excess
+
+    def first_weight(self, n: SimpleNamespace) -> float:
+        """Return 1: weights are relative to the first."""
+        return 1.0
+
+
+@element
 class Rope(PathForce):
     """A rope that runs without friction over points of bodies: the tension is the same everywhere.
 
@@ -74,7 +125,14 @@ class Rope(PathForce):
     may occur more than once.
 
     A winch winds it up: with ``drum`` and ``radius`` its free length is ``length`` less radius times the drum's angle,
-    and the tension turns the drum. With ``feed`` it is ``length`` plus that law. Such a rope consists of elements of
+    and the tension turns the drum. With ``feed`` it is ``length`` plus that law.
+
+    With ``radii`` its points are the centres of pulleys, drums and fixed cylinders, which it touches along tangents; the
+    arcs are part of its length. It slides around a pulley without friction: the torque on the pulley's body is zero. An
+    end with a radius is fixed to its body, a drum: the rope is wound on it as the body turns, over any number of turns,
+    and the torque is tension times radius. A pulley that turns with the rope and has inertia is the end of two ropes.
+
+    A rope with winch, feed or radii consists of elements of
     its own, which decide what an analysis makes of it: coordinates ``NAME_1``, ``NAME_2``, ... of its straight parts
     (`LinearActuator`), a `Limit` ``NAME_limit`` of their sum with the rope on the drum, and for ``feed`` a slide
     ``NAME_feed`` on ground with a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``.
@@ -101,11 +159,24 @@ class Rope(PathForce):
         Rope paid out, an expression of ``t``, tables, parameters and sensors of positions.
     restitution : number [1]
         Of an inextensible rope, from 0 (it stays taut; the default) to 1.
+    radii : list of numbers [m]
+        One for each point, in place of ``drum`` and ``radius``: 0 for a point, positive where the rope runs
+        counterclockwise around the centre, negative where it runs clockwise. Requires ``at``.
+    turns : list of numbers [1]
+        One for each point, 0 if not given: whole turns around a pulley besides the arc between the drawn tangents; at a
+        drum all the rope wound on it as drawn, in turns.
+    axis : direction
+        In space: axis of all pulleys, about which the rope runs, in world coordinates of the drawn configuration. The
+        pulleys, and the points next to them, are in a plane across it as drawn.
 
     Notes
     -----
     A result contains the ``length`` of the path, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack;
-    ``load_1``, ``load_2``, ...: the magnitude of the force on each point, such as the bearing of a pulley.
+    ``load_1``, ``load_2``, ...: the magnitude of the force on each point, such as the bearing of a pulley; with
+    ``radii`` also ``wrap_1``, ``wrap_2``, ...: the angle around each centre [rad]. The ``length`` of such a rope includes
+    its arcs and the rope on its drums, less the rope paid out by ``feed``. A wrap below zero means that the rope would
+    have left the pulley, which is not modelled: it then goes on as if the pulley pulled. Nor is displacement of the
+    straight parts along the axis more than counted in their length: the pulleys swivel by joints, if at all.
     """
 
     stiffness: Stiffness | None = None
@@ -115,6 +186,9 @@ class Rope(PathForce):
     drum: str | None = None
     radius: Length | None = None
     feed: Law | None = None
+    radii: Annotated[Numbers | None, Unit("m")] = None
+    turns: Annotated[Numbers | None, Unit("1")] = None
+    axis: Direction | None = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
@@ -123,6 +197,12 @@ class Rope(PathForce):
     single: ClassVar[str] = "rope"
     shows_parts: ClassVar[bool] = False
     reversing: ClassVar[dict[str, str]] = {"drum": "radius"}
+    axial: ClassVar[bool] = True
+
+    def derive(self, n: SimpleNamespace, env: Any) -> None:
+        """Complete the turns."""
+        if self.radii is not None and self.turns is None:
+            n.turns = (0.0,) * len(self.radii)
 
     def check(self, n: SimpleNamespace) -> None:
         """Require enough points, and valid constants."""
@@ -132,8 +212,50 @@ class Rope(PathForce):
         nonnegative(self, n, "length")
         if (self.drum is None) != (n.radius is None) or n.radius == 0.0:
             raise ModelError(f"{self.title}: a drum has an angle and a radius; give drum='J.angle' and radius=, not 0")
-        if self._winds() and n.length is None and n.at is None:
+        if self.radii is not None:
+            self._check_pulleys(n)
+        elif self.turns is not None or self.axis is not None:
+            raise ModelError(f"{self.title}: turns and axis are those of pulleys; give their radii=, or leave both out")
+        elif self._winds() and n.length is None and n.at is None:
             raise ModelError(f"{self.title}: its points are frames; give its free length too: length=")
+
+    def _check_pulleys(self, n: SimpleNamespace) -> None:
+        """Require centres, a radius and turns for each, and a common tangent of all neighbours."""
+        count = len(self.bodies)
+        if self.drum is not None:
+            raise ModelError(f"{self.title}: radii and drum are both given; a drum is an end with a radius, on its body")
+        if n.at is None:
+            raise ModelError(f"{self.title}: give the centres of its pulleys: at=")
+        if len(n.radii) != count or len(n.turns) != count:
+            raise ModelError(
+                f"{self.title}: {count} bodies need as many radii and turns (0 for a point), got {len(n.radii)} and "
+                f"{len(n.turns)}"
+            )
+        for k, (r, given, turns) in enumerate(zip(n.radii, self.radii or (), n.turns, strict=True)):
+            inner = 0 < k < count - 1
+            if r == 0.0 and not is_point(given):
+                raise ModelError(f"{self.title}: radius {k + 1}, {given!r}, is 0; write the number 0 for a point")
+            if turns < 0.0 or (inner and turns != int(turns)) or (turns and is_point(given)):
+                raise ModelError(
+                    f"{self.title}: turns {k + 1} is {turns:g}; it is 0 at a point, a whole number at a pulley, and not "
+                    "negative"
+                )
+        drawn_rope(self, n)
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Return the points in the reference configuration, of pulleys with z along the axis."""
+        points = super().placed(n, planar)
+        if points is None or self.radii is None:
+            return points
+        return {role: (p, pulley_axes(self, n.axis, planar)) for role, (p, _) in points.items()}
+
+    def path(self) -> tuple[tuple[str, str, Row], ...]:
+        """Return the terms: the distance from each point to the next; none if it is measured by its parts."""
+        return super().path() if self.radii is None else ()
+
+    def measured_with(self) -> str:
+        """Return the limit that measures its length, if it has pulleys."""
+        return "" if self.radii is None else f"{self.name}_limit"
 
     def examine(self, model: Model) -> None:
         """Require an angle of the drum, and a law that its driver accepts."""
@@ -142,30 +264,56 @@ class Rope(PathForce):
         model.law(self.feed, LawOf("m"), f"feed of {self.title}", driver=True)
 
     def _winds(self) -> bool:
-        return self.drum is not None or self.feed is not None
+        return self.drum is not None or self.feed is not None or self.radii is not None
 
     def parts(self, model: Model) -> tuple[Element, ...]:
         """Return the straight parts, their limit, and the slide that pays out."""
         if not self._winds():
             return ()
-        line: Any = Element.of_type("LinearActuator")  # joints are not known here
         spans = self._spans(model)
-        out: list[Element] = [line(f"{self.name}_{k}", *ends, at=at) for k, ends, at, moves in spans if moves]
-        coordinates: Any = [f"{x.name}.length" for x in out]
-        weights: Any = [1.0] * len(out)
+        out: list[Element] = []
+        coordinates: Any = []
+        weights: Any = []
+        for k, ends, at, moves in spans:
+            if moves:
+                part, turning = self._part(k, ends, at)
+                out.append(part)
+                coordinates.append(f"{part.name}.length")
+                weights.append(1.0)
+                if turning is not None:
+                    coordinates.append(f"{part.name}.angle")
+                    weights.append(turning)
         if self.feed is not None:
             out += self._slide(self.feed, model.planar)
             coordinates, weights = [*coordinates, f"{self.name}_feed.displacement"], [*weights, -1.0]
         if self.drum is not None:
             coordinates, weights = [*coordinates, self.drum], [*weights, self.radius]
+        own: Any = {"stiffness": self.stiffness, "damping": self.damping, "restitution": self.restitution}
+        own |= {"weights": weights}
+        limit = f"{self.name}_limit"
+        if self.radii is not None:
+            own |= {"at": self.at, "radii": self.radii, "turns": self.turns or (0.0,) * len(self.radii)}
+            own |= {"axis": self.axis, "fixed": tuple(k - 1 for k, _, _, moves in spans if not moves)}
+            return (*out, PulleyLimit(limit, coordinates, upper=self.length, **own))
         if self.length is None:
             length: Any = _distance_text(at for _, _, at, moves in spans if moves)
         elif fixed := _distance_text(at for _, _, at, moves in spans if not moves):
             length = f"({self.length}) - ({fixed})"
         else:
             length = self.length
-        own: Any = {"stiffness": self.stiffness, "damping": self.damping, "restitution": self.restitution}
-        return (*out, LengthLimit(f"{self.name}_limit", coordinates, weights=weights, upper=length, **own))
+        return (*out, LengthLimit(limit, coordinates, upper=length, **own))
+
+    def _part(self, k: int, ends: tuple[str, str], at: Any) -> tuple[Element, Any]:
+        """Return straight part k (from 1), and the weight of its angle if that counts in the length."""
+        line: Any = Element.of_type("LinearActuator")  # joints are not known here
+        a, b = (0.0, 0.0) if self.radii is None else self.radii[k - 1 : k + 1]
+        name = f"{self.name}_{k}"
+        if is_point(a) and is_point(b):
+            return line(name, *ends, at=at), None
+        span: Any = Element.of_type("RopeSpan")
+        if is_backward(a, b):
+            return span(name, *ends[::-1], at=at[::-1], radii=(_negative(b), 0.0), axis=self.axis), None
+        return span(name, *ends, at=at, radii=(a, b), axis=self.axis), None if is_point(b) else b
 
     def _spans(self, model: Model) -> list[tuple[int, tuple[str, str], Any, bool]]:
         """Return (number, bodies, points, whether its length changes) of each straight part."""
@@ -224,3 +372,8 @@ def _distance_text(spans: Iterable[Any]) -> str:
     """Return an expression of the sum of the distances of pairs of points."""
     squares = (" + ".join(f"(({y}) - ({x}))**2" for x, y in zip(a, b, strict=True)) for a, b in spans)
     return " + ".join(f"sqrt({x})" for x in squares)
+
+
+def _negative(x: float | str) -> float | str:
+    """Return the negative of a number or of an expression."""
+    return f"-({x})" if isinstance(x, str) else -x

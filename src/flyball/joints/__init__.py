@@ -38,6 +38,7 @@ from .rack_and_pinion import RackAndPinion as RackAndPinion
 from .revolute import Revolute as Revolute
 from .rolling import RollingBall as RollingBall
 from .rolling import RollingDisk as RollingDisk
+from .rope_span import RopeSpan as RopeSpan
 from .screw import Screw as Screw
 from .spherical import Spherical as Spherical
 from .translational import Translational as Translational

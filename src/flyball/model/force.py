@@ -224,6 +224,10 @@ class CoordinateForce(Force):
         """Return the curve of the element that carries its effort, if it belongs to it; empty if it acts itself."""
         return ""
 
+    def measured_with(self) -> str:
+        """Return the element that measures its quantity, if it belongs to it; empty if it has terms of its own."""
+        return ""
+
     def path(self) -> tuple[tuple[str, str, Row], ...]:
         """Return the terms (role of F, role of M, formula) of the sum along which it acts, if it has no coordinates."""
         return ()

@@ -111,6 +111,7 @@ class Joint(Element):
     both_sides: ClassVar[str] = ""  # the field that makes such a contact two-sided, for messages
     one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one surface
     axial: ClassVar[bool] = False  # whether a reflection keeps rotations about its axes, not displacements along them
+    place_unit: ClassVar[str] = "m"  # unit of ``place``, on a curve or of a direction, if it has ``nearest``
     thread: ClassVar[bool] = False  # whether its surface is a thread, along which all its coordinates slide together
 
     def ends(self) -> dict[str, str]:

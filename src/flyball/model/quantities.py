@@ -242,7 +242,7 @@ def _of_joint(e: Joint, axes: str) -> Table:
             out |= {"acceleration": Quantity(second.unit, f"{what}_acceleration")}
         out |= {f"{what}_rate": rate._replace(curve=always and len(own) > 1), f"{what}_acceleration": second}
     if hasattr(e, "nearest") and "position" not in own:
-        out["place"] = Quantity("m", curve=True)
+        out["place"] = Quantity(e.place_unit, curve=True)
     if not e.blocks:  # what acts along its coordinates has efforts of its own
         return out
     return out | _of_wrench(axes) | ({"torque": Quantity("N*m", curve=True, array=True)} if planar else {})
@@ -266,6 +266,9 @@ def _of_force(model: Model, e: Force, axes: str) -> Table:
     if isinstance(e, PathForce):
         inner = range(1, len(e.bodies) - 1)
         out |= {f"load_{k + 1}": Quantity("N", curve=k in inner, array=True) for k in range(len(e.bodies))}
+        for k, radius in enumerate(getattr(e, "radii", None) or ()):
+            if radius != 0.0:
+                out[f"wrap_{k + 1}"] = Quantity("rad", curve=True, array=True)
     if isinstance(e, (BodyForce, TwoFrameForce)):
         out = _of_wrench(axes) | ({"tz": Quantity("N*m", "torque", curve=True)} if len(axes) == 2 else {}) | out
     return out | {k: Quantity(unit, array=True) for k, unit in (("energy", "J"), ("power", "W"), ("work", "J"))}

@@ -217,17 +217,24 @@ def _end(records: RecordedMotion, owner: Joint | Located, role: str) -> Kinemati
     return records.named(owner.name) if role == "M" else records.attached(-1, (0.0,) * 3, tuple(np.eye(3).ravel()))
 
 
-def coordinate_parameters(x: Values, owner: Joint | Located, row: Row) -> tuple[float, ...]:
-    """Return the parameters of a coordinate's formula, without its constant."""
-    if not row.of_kind.place:
-        return (*row.par[:6], 0.0, 0.0)
-    first, second = x.system.term_parameters[x.structure.terms_of[owner.name][0], 1:3]  # of the joint's own rows
-    return (row.par[0], float(first.real), float(second.real), *(0.0,) * 5)
+def coordinate_parameters(x: Values, owner: Any, row: Row) -> tuple[tuple[float, ...], np.ndarray]:
+    """Return the parameters of a coordinate's formula, without its constant, and the table of constants it reads."""
+    if not row.of_kind.splines:
+        return (*row.par[:6], 0.0, 0.0), x.system.const
+    curves = owner.curves(x.numbers[owner.name])
+    return (row.par[0], 0.0, float(len(curves[0])), *(0.0,) * 5), np.concatenate(curves)
 
 
 def curve_places(result: Result, owner: Any) -> np.ndarray:
     """Return the position of a joint's point on its curve over time."""
-    return result.states[:, result.values.structure.state_at[f"{owner.name}.place"]]
+    at = result.values.structure.state_at.get(f"{owner.name}.place")
+    if at is not None:
+        return result.states[:, at]
+    n, r = result.values.numbers[owner.name], result.motions  # of a part of a rope, where nothing acts along it
+    ends = [r.frame(result.values.structure.frame_at[owner.name, role, ""]) for role in "FM"]
+    p, R = ([np.stack(np.broadcast_arrays(*f[i], r.zeros()))[:-1].T for f in ends] for i in (0, 1))
+    poses = zip(*(zip(x, y.reshape(-1, 3, 3), strict=True) for x, y in zip(p, R, strict=True)), strict=True)
+    return np.unwrap([owner.nearest(n, *pair)[0] for pair in poses])
 
 
 def measured_coordinate(
@@ -239,12 +246,12 @@ def measured_coordinate(
     times resolve it.
     """
     F, M, c = coordinate_records(records, owner, what)
-    par = coordinate_parameters(records.x, owner, c.row)
+    par, data = coordinate_parameters(records.x, owner, c.row)
     counts = c.row.of_kind.turns and turns is not None
     hint = turns if counts or c.row.of_kind.place else 0.0
     with np.errstate(all="ignore"):  # at a singular position
         value, f, tM, tF, second = c.row.of_kind.row(
-            (1.0, *par[1:]) if counts else par, F, M, hint, records.x.system.const
+            (1.0, *par[1:]) if counts else par, F, M, hint, data
         )
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
     if c.row.of_kind.turns and not counts:
@@ -308,9 +315,9 @@ def term_coefficient(result: Result, k: int) -> float:
 def unit_effort_wrench(result: Result, owner: Joint | Located, what: str) -> Wrench:
     """Return the wrench on ``body_j``, or on the body, about M's origin, of a unit effort along a coordinate."""
     F, M, c = coordinate_records(result.motions, owner, what)
-    par = coordinate_parameters(result.values, owner, c.row)
+    par, data = coordinate_parameters(result.values, owner, c.row)
     hint = curve_places(result, owner) if c.row.of_kind.place else 0.0
-    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, hint, result.values.system.const)
+    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, hint, data)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
     return scale(c.sign, force), scale(c.sign, torque)
 

@@ -339,6 +339,9 @@ def force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLin
     numbers = places.result.values.numbers[e.name]
     if len(ends) > 1:
         points = [places.track(end)[0] for end in ends]
+        if getattr(e, "radii", None) is not None:
+            view = places.result[e.name]
+            points = view.course.line(view.wraps)
         rest = _free_length(e, places.result, points) if e.single == "rope" else None  # others are never slack
         return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=None if rest is None else rest[every])
     pair = places.ends(e)
@@ -354,7 +357,7 @@ def _free_length(e: Any, result: Result, points: list[np.ndarray]) -> np.ndarray
     if e.transmitted():  # wound up or paid out: its path, and what is slack
         limit = curve_parts(e.transmitted())[0]
         slack: np.ndarray = result.values.numbers[limit].upper - result[limit].value
-        return result[e.name].length + slack
+        return slack + sum(np.sqrt(((b - a) ** 2).sum(axis=1)) for a, b in pairwise(points))
     if getattr(numbers, "length", None) is not None:
         return np.full(len(points[0]), float(numbers.length))
     steps = [b[:1] - a[:1] for a, b in pairwise(points)]

@@ -249,16 +249,9 @@ def _element_arrows(result: Result, places: AttachedFrames, e: Any) -> Iterator[
 
 def _rope_arrows(places: AttachedFrames, name: str, view: Any) -> Iterator[ArrowData]:
     """Return the rope's forces on its points, towards their neighbours."""
-    ends = rope_ends(places, name)
-    points = [places.track(end)[0] for end in ends]
-    steps = [b - a for a, b in pairwise(points)]
-    units = [d / np.maximum(np.sqrt((d * d).sum(axis=1)), 1e-300)[:, None] for d in steps]
-    nothing = np.zeros_like(points[0])
-    for k, end in enumerate(ends):
-        after = units[k] if k < len(units) else nothing
-        before = units[k - 1] if k > 0 else nothing
+    for end, (_, force) in zip(rope_ends(places, name), view.pulls, strict=True):
         if not end.grounded:
-            yield name, "element", "force", end, view.tension[:, None] * (after - before)
+            yield name, "element", "force", end, force
 
 
 def rope_ends(places: AttachedFrames, name: str) -> list[AttachedFrame]:

@@ -11,6 +11,8 @@ from ...constraints.switches.switch_kind import BY_RATE, HELD
 from ...engine.entry_point import characteristic_rate_within
 from ...engine.loads import REST_SPEED, force_row, wrench_power
 from ...errors import AnalysisError
+from ...forces.rope_geometry import RopeCourse, drawn_rope, is_backward, rope_course
+from ...forces.rope_geometry import sign as sign_of
 from ...laws.bytecode import STACK_RESERVE, evaluate
 from ...laws.interval_evaluation import evaluate_over_time, read_steps, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
@@ -122,6 +124,8 @@ class ForceView(PartView):
         The effort of a rigid element without a row, because the motion was computed without it, is unknown: nan.
         """
         s, own = self._x.structure, self._rows()
+        if isinstance(self.element, CoordinateForce) and (other := self.element.measured_with()):
+            return self._result[other]._whole_along  # type: ignore[no-any-return]
         if any(f is self.element for f in s.forces):
             x, rate, effort = self._along()
         elif own:
@@ -187,19 +191,41 @@ class ForceView(PartView):
         _, force, torque = self._between()
         return tuple(np.stack([np.broadcast_to(c, (n,)) for c in w], axis=1) for w in (force, torque))  # type: ignore[return-value]
 
+    @cached_property
+    def course(self) -> RopeCourse:
+        """Where a rope or path runs, over time."""
+        r, s, n = self._result.motions, self._x.structure, self._x.numbers[self.element.name]
+        frames = [r.frame(s.frame_at[self.element.name, role, ""]) for role in self.element.ends()]
+        centres = [np.stack(p, axis=1) for p, *_ in frames]
+        axes = [np.stack(np.broadcast_arrays(R[2], R[5], R[8] + r.zeros()), axis=1) for _, R, *_ in frames]
+        return rope_course(centres, axes, getattr(n, "radii", None) or (0.0,) * len(frames))
+
     @property
     def pulls(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
-        r, s = self._result.records, self._x.structure
-        points = [np.stack(r.frame(s.frame_at[self.element.name, role, ""])[0], axis=1) for role in self.element.ends()]
-        tension = -self._whole_along[2]
-        forces = [np.zeros_like(p) for p in points]
-        for k in range(len(points) - 1):
-            d = points[k + 1] - points[k]
-            pull = d * (tension / np.sqrt((d * d).sum(axis=1)))[:, None]
-            forces[k] += pull
-            forces[k + 1] -= pull
-        return list(zip(points, forces, strict=True))
+        x, tension = self.course, -self._whole_along[2]
+        forces = [np.zeros_like(p) for p in x.centres]
+        for k, u in enumerate(x.pulls):
+            forces[k] += u * tension[:, None]
+            forces[k + 1] -= u * tension[:, None]
+        return list(zip(x.centres, forces, strict=True))
+
+    @cached_property
+    def wraps(self) -> list[np.ndarray]:
+        """For a rope over pulleys: the angle around each point over time [rad], with full turns, (n,)."""
+        e, n = self.element, self._x.numbers[self.element.name]
+        drawn = drawn_rope(e, n)
+        out = [phi + self._result.motions.zeros() for phi in drawn.wraps]
+        for k, place in enumerate(drawn.places):
+            name = f"{e.name}_{k + 1}"
+            if name not in self._result.model or not hasattr(self._result.model[name], "radii"):
+                continue
+            part = self._result[name]
+            turned = part.place - place
+            back = is_backward(n.radii[k], n.radii[k + 1])
+            out[k] = out[k] + sign_of(n.radii[k]) * turned
+            out[k + 1] = out[k + 1] - sign_of(n.radii[k + 1]) * (turned if back else turned - part.angle)
+        return [0.0 * phi if r == 0.0 else phi for phi, r in zip(out, n.radii, strict=True)]
 
     @property
     def energy(self) -> np.ndarray:
@@ -258,6 +284,8 @@ class ForceView(PartView):
         if name.startswith("load_"):
             pull = self.pulls[int(name.removeprefix("load_")) - 1][1]
             return np.sqrt((pull * pull).sum(axis=1))
+        if name.startswith("wrap_"):
+            return self.wraps[int(name.removeprefix("wrap_")) - 1]
         if name not in outputs:
             return self._whole[name == "torque"]
         if self.element.figures is not None:

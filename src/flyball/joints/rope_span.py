@@ -1,0 +1,67 @@
+"""Straight part of a rope between two pulleys: what a `Rope` with radii consists of."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar
+
+from ..constraints.angle import unwrapped
+from ..constraints.blocks import ANGLE, TANGENT
+from ..constraints.tangent import tangent
+from ..math.vec import matrix_product
+from ..model.element import Numbers, PointPair, Unit, element
+from ..model.joint import Coordinate, Joint, WorldFrame
+from .distance import Distance
+
+
+@element
+class RopeSpan(Joint):
+    """Straight part of a `Rope` between two pulleys, or between a pulley on ``body_i`` and a point of ``body_j``.
+
+    It constrains nothing. Its coordinate ``length`` is that of the part, less the rope that it has wound on both
+    pulleys since their reference directions as it swings; ``angle`` is that of ``body_j`` relative to ``body_i``;
+    ``place`` is the direction of the part in the frame of ``body_i``, with full turns [rad].
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Bodies, or frames fixed on bodies; ``"ground"`` is the world.
+    at : pair of points [m]
+        Both centres, in world coordinates of the drawn configuration.
+    radii : pair of numbers [m]
+        Positive where the rope, on its way from ``body_i`` to ``body_j``, runs counterclockwise around the pulley.
+    axis : direction
+        In space: normal of the plane of both pulleys.
+    """
+
+    at: PointPair | None = None  # type: ignore[assignment]
+    radii: Annotated[Numbers, Unit("m")] = (0.0, 0.0)
+
+    coordinates: ClassVar = {"length": Coordinate(TANGENT), "angle": Coordinate(ANGLE)}
+    needs_axis: ClassVar[bool] = True
+    in_own_axes: ClassVar[tuple[str, ...]] = ("radii",)
+    axial: ClassVar[bool] = True
+    place_unit: ClassVar[str] = "rad"
+    symbol: ClassVar[str] = "rope"
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """Return frames with origins at both centres and z along the axis."""
+        R = self.orientation(n.axis, planar)
+        (a, _), (b, _) = Distance.world_frames(self, n, planar)  # type: ignore[arg-type]
+        return (a, R), (b, R)
+
+    def curves(self, n: SimpleNamespace) -> tuple[list[Any], ...]:
+        """Return the second radius less the first."""
+        return ([n.radii[1] - n.radii[0]],)
+
+    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any]:
+        """Return the direction of the part in F, within half a turn of the drawn one."""
+        (here, R), (there, _) = self.world_frames(n, len(n.at[0]) == 2)
+        (b,) = self.curves(n)[0]
+        drawn = tangent(tuple(matrix_product(R.T, there - here)), b)[1]
+        return (unwrapped(tangent(tuple(matrix_product(F[1].T, M[0] - F[0])), b)[1], drawn),)
+
+    def end_message(self, n: SimpleNamespace, at: float) -> str:
+        """Return nothing: it has no ends."""
+        return ""
