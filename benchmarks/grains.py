@@ -2,7 +2,8 @@
 
 Usage: ``python benchmarks/grains.py [hourglass wheel] [--seconds T] [--count N] [--alone] [--json FILE]``. CPU seconds
 of one thread per simulated second; stretches of both engines are taken in turn, so that a busy spell of the machine
-hits both. MuJoCo stops after `LIMIT`, and its ratio is over the same stretches. It has CG, elliptic cones and its stiffest stable contacts for the step.
+hits both. MuJoCo stops after `LIMIT`, and its ratio is over the same stretches. It has CG, elliptic cones and its
+stiffest stable contacts for the step.
 """
 
 from __future__ import annotations

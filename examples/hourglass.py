@@ -1,9 +1,9 @@
 """An hourglass: grains run through its neck at a constant rate, which grows with the neck by Beverloo's law.
 
 Grains of diameter d, n of them per area or volume, pass a neck of breadth D at C n sqrt(g) (D - k d)^(3/2) per second
-in the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike the
-rate of water it does not depend on the height of filling: the grains above a neck carry each other like an arch, and
-below it they fall freely.
+in the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike
+the rate of water it does not depend on the height of filling: the grains above a neck carry each other like an arch,
+and below it they fall freely.
 
 Run it with ``python examples/hourglass.py out``: it prints the rates, and writes a page with the animation.
 """
