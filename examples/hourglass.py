@@ -21,7 +21,7 @@ SIZES = GRAIN * np.linspace(0.9, 1.1, 3)  # m, diameters
 COLORS = ("#e5862b", "#d9a441", "#c9704a")
 STEEP = np.tan(np.radians(50))  # slope of the funnel
 FULL, PANELS = 400, 12  # grains; panels of the glass around its axis, in space
-STEP = fb.Stepping(step=5e-4, solver="gauss-seidel")
+STEP = fb.Stepping(step=5e-4, solver="gauss-seidel", iterations=100)
 
 
 def panel(low: tuple[float, float], high: tuple[float, float], way: float, wide: float) -> fb.Hull:

@@ -39,7 +39,7 @@ def test_rate_of_an_hourglass_is_constant_and_independent_of_its_filling():
     assert rates[0] == pytest.approx(rates[1], rel=0.12)
     early, late = HOURGLASS["rate"](full, 0.2, 0.5), HOURGLASS["rate"](full, 0.5, 0.8)  # water: 1.4 to 1
     assert early == pytest.approx(late, rel=0.2)
-    assert full.health.contact.worst_overlap < 0.1 * GRAIN
+    assert full.health.contact.worst_overlap < 0.15 * GRAIN
 
 
 def test_a_block_on_a_tilted_plane_slides_from_the_angle_of_friction():
