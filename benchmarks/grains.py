@@ -100,7 +100,7 @@ def mjcf_shape(shape: Any, name: str) -> tuple[str, str]:
 
 def mjcf(m: Any, friction: float, step: float) -> str:
     """The scene for MuJoCo, from the shapes of the mechanism."""
-    ground = next(g for g in m.elements() if isinstance(g, fb.Ground))
+    ground: Any = next(g for g in m.elements() if isinstance(g, fb.Ground))
     made = [mjcf_shape(s, f"g{k}") for k, s in enumerate(ground.shape)]
     grains = "".join(
         f'<body pos="{text(x)}"><freejoint/><geom type="sphere" size="{s.shape.radius}" density="2500"/></body>'
