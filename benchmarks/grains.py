@@ -2,7 +2,8 @@
 
 Usage: ``python benchmarks/grains.py [hourglass wheel] [--seconds T] [--count N] [--alone] [--json FILE]``. CPU seconds
 of one thread per simulated second; stretches of both engines are taken in turn, so that a busy spell of the machine
-hits both. MuJoCo stops after `LIMIT`, and its ratio is over the same stretches. It has CG, elliptic cones and its stiffest stable contacts for the step.
+hits both. MuJoCo stops after `LIMIT`, and its ratio is over the same stretches. It has CG, elliptic cones and its
+stiffest stable contacts for the step.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def wheel(count: int) -> fb.Mechanism:
         "wheel", gravity=(0, -9.81, 0), parameters={"w": WHEEL["SPEED"], "v": WHEEL["SPEED"] * r * (1 - SLIP)}
     )
     m.add(
-        fb.Ground("trough", shape=trough(y)),
+        fb.Ground("trough", shape=tuple(trough(y))),
         fb.Body("carriage", mass=0.1, inertia=(1e-4,) * 3, position=(x, y, 0)),
         fb.Body("fork", mass=0.1 * MASS, inertia=(1e-4,) * 3, position=(x, y, 0)),
         fb.Body(
@@ -97,9 +98,9 @@ def mjcf_shape(shape: Any, name: str) -> tuple[str, str]:
     return "", f'<geom type="cylinder" size="{shape.radius} {shape.length / 2}" {pose}/>'
 
 
-def mjcf(m: fb.Mechanism, friction: float, step: float) -> str:
+def mjcf(m: Any, friction: float, step: float) -> str:
     """The scene for MuJoCo, from the shapes of the mechanism."""
-    ground = next(g for g in m.elements() if isinstance(g, fb.Ground))
+    ground: Any = next(g for g in m.elements() if isinstance(g, fb.Ground))
     made = [mjcf_shape(s, f"g{k}") for k, s in enumerate(ground.shape)]
     grains = "".join(
         f'<body pos="{text(x)}"><freejoint/><geom type="sphere" size="{s.shape.radius}" density="2500"/></body>'
@@ -125,7 +126,7 @@ def mjcf(m: fb.Mechanism, friction: float, step: float) -> str:
 
 def flyball_run(m: fb.Mechanism, step: float) -> tuple[Callable[[float], None], Callable[[], dict[str, float]]]:
     """What goes on by a time, and what tells figures."""
-    runs: list[fb.Result] = []
+    runs: list[Any] = []
     method = fb.Stepping(step=step, solver="gauss-seidel")
 
     def advance(t: float) -> None:

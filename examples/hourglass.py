@@ -1,9 +1,9 @@
 """An hourglass: grains run through its neck at a constant rate, which grows with the neck by Beverloo's law.
 
 Grains of diameter d, n of them per area or volume, pass a neck of breadth D at C n sqrt(g) (D - k d)^(3/2) per second
-in the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike the
-rate of water it does not depend on the height of filling: the grains above a neck carry each other like an arch, and
-below it they fall freely.
+in the plane and at C n sqrt(g) (D - k d)^(5/2) in space (W. A. Beverloo, H. A. Leniger, J. van de Velde 1961). Unlike
+the rate of water it does not depend on the height of filling: the grains above a neck carry each other like an arch,
+and below it they fall freely.
 
 Run it with ``python examples/hourglass.py out``: it prints the rates, and writes a page with the animation.
 """
@@ -21,7 +21,7 @@ SIZES = GRAIN * np.linspace(0.9, 1.1, 3)  # m, diameters
 COLORS = ("#e5862b", "#d9a441", "#c9704a")
 STEEP = np.tan(np.radians(50))  # slope of the funnel
 FULL, PANELS = 400, 12  # grains; panels of the glass around its axis, in space
-STEP = fb.Stepping(step=5e-4, solver="gauss-seidel")
+STEP = fb.Stepping(step=5e-4, solver="gauss-seidel", iterations=100)
 
 
 def panel(low: tuple[float, float], high: tuple[float, float], way: float, wide: float) -> fb.Hull:
