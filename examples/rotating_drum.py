@@ -3,7 +3,7 @@
 The grains turn with the drum as one body until their surface is too steep; from then on they slide down as fast as the
 drum lifts them. The angle grows with the friction between grains and reaches a limit, because round grains roll; a
 resistance against rolling raises it further. Grains without friction still do not flow like water, since they have to
-climb over each other (5.8 degrees in space: P.-E. Peyneau, J.-N. Roux 2008).
+climb over each other.
 
 In a drum the mass centre of all grains is on the normal of their surface through the axis, however full the drum is, so
 it gives the angle. The motor carries their weight at the arm of that mass centre.
