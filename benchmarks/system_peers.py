@@ -155,7 +155,9 @@ def arm_spec(a: ArmNumbers, elastic: bool, h: float) -> Any:
         above.add_joint(name=f"joint{k}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=e.axis(k))
         below = e.LENGTHS[k]
         if elastic:
-            gear = spec.add_tendon(name=f"gear{k}", stiffness=[a.stiffness[k], 0, 0], damping=[1e-3 * a.stiffness[k], 0, 0])
+            gear = spec.add_tendon(
+                name=f"gear{k}", stiffness=[a.stiffness[k], 0, 0], damping=[1e-3 * a.stiffness[k], 0, 0]
+            )
             gear.springlength = [0.0, 0.0]
             gear.wrap_joint(f"joint{k}", 1.0)
             gear.wrap_joint(f"motor{k}", -1.0)
@@ -186,7 +188,12 @@ def install_computed_torque(a: ArmNumbers, model: Any, data: Any) -> None:
     def control(_model, _data):
         t = carray(pointer(act), 1)[0]
         q, v, f = carray(pointer(qpos), nv), carray(pointer(qvel), nv), carray(pointer(force), nv)
-        q_, v_, a_, f_ = (carray(pointer(q1), n), carray(pointer(v1), n), carray(pointer(a1), n), carray(pointer(f1), n))
+        q_, v_, a_, f_ = (
+            carray(pointer(q1), n),
+            carray(pointer(v1), n),
+            carray(pointer(a1), n),
+            carray(pointer(f1), n),
+        )
         s = min(max(t / d, 0.0), 1.0)
         r, rd = s**3 * (10 - 15 * s + 6 * s * s), 30 * s * s * (1 - s) ** 2 / d
         rdd = 60 * s * (1 - s) * (1 - 2 * s) / d**2
@@ -283,7 +290,9 @@ class MujocoTrack:
         self.bodies: dict[str, Any] = {}
         self.at = {b.name: np.array([*b.position, 0.0]) for b in m.bodies}
         self.by_name = {b.name: b for b in m.bodies}
-        plane = s.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1), quat=(0.5**0.5, -(0.5**0.5), 0, 0))
+        plane = s.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1), quat=(0.5**0.5, -(0.5**0.5), 0, 0)
+        )
         plane.contype, plane.conaffinity, plane.friction = 4, 0, (0.8, 0, 0)
         plane.condim, plane.solref, plane.solimp = 3, *self.soft.values()
         self.free("hull")
@@ -320,7 +329,6 @@ class MujocoTrack:
             mesh = self.spec.add_mesh(name=f"{name} {k}", uservert=corners.ravel())
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
             g = body.add_geom(type=kinds.mjGEOM_MESH, meshname=mesh.name)
-            # a mesh is drawn about its own centre of mass; MuJoCo puts it back
         plate = "shoe" in name
         g.contype, g.conaffinity = (0, 5) if plate else (1, 0)
         g.friction, g.condim = ((0.8 if plate else 0.3), 0, 0), 3
@@ -389,7 +397,7 @@ def mujoco_track(m: fb.Mechanism, speed: float, t_end: float, h: float, solref: 
     ramp = 1.0 / (0.15 * 13 / (2 * np.pi))
     hull, axle = model.joint("hull:x").dofadr[0], model.joint("track.sprocket_axle").dofadr[0]
     rows, seconds, overlap = [], 0.0, 0.0
-    for k in range(int(round(t_end / 0.02))):
+    for k in range(round(t_end / 0.02)):
         s = np.clip(0.02 * k - 0.5, 0.0, 1.0)
         data.ctrl[0] = -speed * ramp * s * s * (3 - 2 * s)
         begin = time.process_time()

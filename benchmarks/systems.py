@@ -113,7 +113,9 @@ def own_row(name: str, s: System) -> dict[str, Any]:
     for rtol in TOLERANCES:
         coarse, fine = (simulate(m, s.t_end, rtol=r, outputs=501, progress=False) for r in (rtol, 1e-3 * rtol))
         p, q = positions(m, fine), positions(m, coarse)
-        error = max(float(abs(p - q).max()) / max(longest(p), 1e-9), float(abs(turns(m, fine) - turns(m, coarse)).max()))
+        error = max(
+            float(abs(p - q).max()) / max(longest(p), 1e-9), float(abs(turns(m, fine) - turns(m, coarse)).max())
+        )
         if error <= CONVERGED:
             break
     again = s.make()
@@ -155,10 +157,14 @@ def compare_arm(axes: int, target: float = 1e-6) -> list[dict[str, Any]]:
 
     exact = angles(simulate(m, t_end, rtol=1e-11, outputs=LOOKS + 1))
     one = Contest(f"robot of {axes} axes", t_end, partial(off, exact), "error", target, LOOKS, 8.0, t_end)
+
+    def by_mujoco(n: float, samples: int) -> Any:
+        return peers.mujoco_arm(numbers, t_end, steps_of(n), samples)
+
     others = [
-        Peer("mujoco", "RK4, mj_inverse in a compiled callback", lambda n, s: peers.mujoco_arm(numbers, t_end, steps_of(n), s), 2000),
+        Peer("mujoco", "RK4, mj_inverse in a compiled callback", by_mujoco, 2000),
         Peer("pinocchio", "SciPy DOP853", partial(peers.pinocchio_arm, numbers, t_end), 1e-5),
-    ]  # fmt: skip
+    ]
     return contest.run(one, [Flyball(m, angles, method) for method in ("dop853", "rk45")], others)
 
 
@@ -219,8 +225,8 @@ def compare_truck(target: float = 1e-6) -> list[dict[str, Any]]:
     """Truck that drops on its tyres and coasts: flyball's Fiala tyre, Exudyn's rolling disc; each against itself."""
     m, tyre, t_end = coasting(), module("truck").TYRE, 4.0
     exact = positions(m, simulate(m, t_end, rtol=1e-11, outputs=LOOKS + 1))
-    rows = contest.run(Contest("truck", t_end, partial(off, exact), "error", target, LOOKS, 20.0, t_end),
-                       [Flyball(m, partial(positions, m), method) for method in ("dop853", "rk45", "radau")], [])  # fmt: skip
+    ours = [Flyball(m, partial(positions, m), method) for method in ("dop853", "rk45", "radau")]
+    rows = contest.run(Contest("truck", t_end, partial(off, exact), "error", target, LOOKS, 20.0, t_end), ours, [])
 
     def solve(setting: str, n: float, samples: int) -> Any:
         return peers.exudyn_truck(m, tyre, SPEED, t_end, setting, steps_of(n), samples)
