@@ -11,6 +11,10 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 import flyball as fb
+from flyball.controllers.joint_controller import with_leaves
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.tracing import law_tree
+from flyball.model.expressions import Expression
 from tests.control.robots import ARM, CRANE, arm, crane, decay, driven
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -233,3 +237,44 @@ def test_a_coordinate_that_follows_from_another_is_refused():
     m.add(c)
     with pytest.raises(fb.ModelError, match=r"pd'.*(S.displacement follows from|adds constraint equations)"):
         driven(m, c).simulate(0.1)
+
+
+def test_a_command_is_computed_once_in_an_effort():
+    """x + x y + x^2, of x = sin(t): one sine."""
+    g = Graph()
+    x, y = g.symbol("x"), g.symbol("y")
+    tree = with_leaves(law_tree(x + x * y + x * x), {"x": Expression.parse("sin(t)").tree}, {"t"})
+    assert sum(n.kind == "sin" for n in tree.walk()) == 1
+    u = np.sin(0.7)
+    assert Expression("effort", tree).evaluate({"t": 0.7, "y": 3.0}) == pytest.approx(u + 3 * u + u * u, rel=1e-15)
+
+
+@pytest.mark.parametrize(("leaf", "times"), [("abs(t)", 1), ("abs(q)", 2), ("sin(q)", 1), ("min(q, a)", 2)])
+def test_a_command_with_a_corner_in_the_motion_stays_in_sight(leaf, times):
+    g = Graph()
+    x = g.symbol("x")
+    found = with_leaves(law_tree(x * g.symbol("y") + x), {"x": Expression.parse(leaf).tree}, {"t", "a"})
+    kind = leaf.partition("(")[0]
+    assert sum(n.kind == kind for n in found.walk()) == times
+
+
+def test_errors_decay_as_set_where_a_gain_has_a_corner_in_the_motion():
+    """Gains of q that jump by a switch at q = 0.15: two exponentials, joined where the angle passes it."""
+    run = arm(computed(kp=("where(shoulder.angle < 0.15, 64, 30)", 64.0))).simulate(2, **TIGHT)
+    below = run["shoulder.angle"] < 0.15
+    assert below.any() and not below.all()
+    kp = np.where(below, 64.0, 30.0)
+    e, rate = run["c.shoulder_error"], -run["shoulder.rate"]
+    away = np.abs(run["shoulder.angle"] - 0.15) > 1e-4
+    expected = -KD[0] * rate - kp * e
+    assert -run["shoulder.acceleration"][away] == pytest.approx(expected[away], abs=1e-6)
+
+
+def test_breakpoints_of_a_reference_follow_its_parameters():
+    """The second motion has another time of the ramp's end; its steps end there, not where those of the first did."""
+    m = arm(computed(reference=["step(t, 0, 0, rise, 0.5)", 0.0]), rise=1.0)
+    for rise in (1.0, 0.3, 1.0):
+        run = m.simulate(1.5, parameters={"rise": rise}, outputs=[0.5 * rise, rise, 1.5], **TIGHT)
+        s = np.minimum(run.t / rise, 1.0)
+        error = run["c.shoulder_error"]
+        assert error + run["shoulder.angle"] == pytest.approx(0.5 * s**2 * (3 - 2 * s), abs=1e-10)

@@ -29,7 +29,6 @@ from ..results.motion_record import record_motion
 from ..results.result import Result, concatenate_results
 from ..results.result_loading import read_result
 from ..results.study import study_fingerprint
-from .impulse_stepping.impulse_simulation import INTERRUPTED_MESSAGE
 from .initial_state import start_time
 from .integration_intervals import Segment
 from .integration_options import output_times
@@ -121,6 +120,8 @@ class _SegmentedMotion:
             kept.add(found)
             if part.asked:
                 result = kept.whole()
+                from .impulse_stepping.impulse_simulation import INTERRUPTED_MESSAGE
+
                 result.health.message = INTERRUPTED_MESSAGE.format(result.final[0])
                 raise self._interrupted(result)
         result = kept.whole(found)

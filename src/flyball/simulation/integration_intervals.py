@@ -143,12 +143,18 @@ def whole_motion() -> Segment:
     return Segment(lasts=math.inf)
 
 
+CACHED_SPANS = 4  # spans and sets of constants of which the breakpoints are cached for each mechanism
 SLIVER = 2e-14  # shortest remainder of an interval that is integrated, relative to the largest time
 
 
 def known_breaks(c: CompiledMechanism, t0: float, t1: float) -> Breakpoints:
-    """Return the times between two times [s] at which laws or guards have breakpoints or short pulses by time alone."""
-    return find_breakpoints(laws_of_time(c), c.system.const, t0, t1)
+    """Return the times between two times [s] at which laws or guards have breakpoints or short pulses by time alone.
+
+    They follow from the span and the constants of the laws, so they are cached for the next motion.
+    """
+    laws, const = laws_of_time(c), c.system.const
+    key = t0, t1, const.tobytes()
+    return c.structure.cache.get("breakpoints", key, CACHED_SPANS, lambda: find_breakpoints(laws, const, t0, t1))
 
 
 def laws_of_time(c: CompiledMechanism) -> Timed:

@@ -29,7 +29,6 @@ from . import initial_state
 from .events.context import EventContext
 from .events.event_loop import integrate_events
 from .implicit_integrators import refuse_for_variational
-from .impulse_stepping.impulse_simulation import simulate_by_impulses
 from .initial_state import InitialState, find_initial_state, start_time
 from .integration_intervals import (
     Segment,
@@ -129,6 +128,8 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
     t_start, _, times = span
     if isinstance(o.method, Stepping):
         with progress_bar(o.progress, "simulating") as tell:
+            from .impulse_stepping.impulse_simulation import simulate_by_impulses  # other motions start without it
+
             return simulate_by_impulses(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
     model = with_contact_points(model, o.parameters)
     begun = find_initial_state(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)

@@ -77,15 +77,20 @@ SPENT = CostAccount()
 
 
 EVALUATION_COST, COST_SHARE = 150.0, 0.6  # of an evaluation: fixed cost [ns], factor of the right-hand side's
+LAW_OPERATION_COST = 3.5  # of an operation of a law's bytecode [ns]
 
 
 def mechanism_kind(s: Structure) -> tuple[str, float]:
     """Return a key shared by mechanisms that differ in numbers only, and the cost of an evaluation by the general
     engine [ns].
     """
-    return s.cache.get(
-        "kind", None, 1, lambda: (_structure_hash(s), EVALUATION_COST + COST_SHARE * right_hand_side_cost(s))
-    )
+    return s.cache.get("kind", None, 1, lambda: (_structure_hash(s), _evaluation_cost(s)))
+
+
+def _evaluation_cost(s: Structure) -> float:
+    """Return the cost of an evaluation by the general engine, its laws included [ns]."""
+    laws = LAW_OPERATION_COST * sum(s.code[at] for at in s.laws)
+    return EVALUATION_COST + COST_SHARE * right_hand_side_cost(s) + laws
 
 
 def _structure_hash(s: Structure) -> str:
