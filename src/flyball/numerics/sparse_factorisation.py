@@ -85,6 +85,52 @@ def ldl_solve(P, L, D, x):
         x[k] = v
 
 
+COLUMNS = 8  # right-hand sides that `ldl_solve_columns` solves together: those of one cache line
+
+
+@formula
+def load_columns(x, k):
+    """Row k of an array of `COLUMNS` columns."""
+    return x[k, 0], x[k, 1], x[k, 2], x[k, 3], x[k, 4], x[k, 5], x[k, 6], x[k, 7]
+
+
+@formula
+def store_columns(x, k, a):
+    """Write row k of an array of `COLUMNS` columns."""
+    x[k, 0], x[k, 1], x[k, 2], x[k, 3], x[k, 4], x[k, 5], x[k, 6], x[k, 7] = a
+
+
+@formula
+def add_columns(a, l, b):
+    """A + l b, for rows of `COLUMNS` entries."""
+    return (
+        a[0] + l * b[0],
+        a[1] + l * b[1],
+        a[2] + l * b[2],
+        a[3] + l * b[3],
+        a[4] + l * b[4],
+        a[5] + l * b[5],
+        a[6] + l * b[6],
+        a[7] + l * b[7],
+    )
+
+
+@formula
+def ldl_solve_columns(P, L, D, x):
+    """Solve for `COLUMNS` right-hand sides (n, COLUMNS) in place; x is in the factored order."""
+    n, Lp, Li = P.perm.shape[0], P.Lp, P.Li
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(n):
+        v = load_columns(x, k)
+        for p in range(Lp[k], Lp[k + 1]):
+            store_columns(x, Li[p], add_columns(load_columns(x, Li[p]), -L[p], v))
+    for k in range(n - 1, -1, -1):
+        v = add_columns(zero, D[k], load_columns(x, k))
+        for p in range(Lp[k], Lp[k + 1]):
+            v = add_columns(v, -L[p], load_columns(x, Li[p]))
+        store_columns(x, k, v)
+
+
 def analyse_ldl(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None = None) -> tuple[LDLPattern, np.ndarray]:
     """Find an order of elimination and the pattern of L for a symmetric matrix with entries (i, j).
 

@@ -1,4 +1,4 @@
-"""Tracks: hinged shoes around sprocket, idler, road wheels on torsion bars, and support rollers."""
+"""Tracks in plane and space: hinged shoes around sprocket, idler, road wheels on torsion bars, support rollers."""
 
 from __future__ import annotations
 
@@ -12,15 +12,21 @@ from scipy.optimize import brentq
 
 from ..errors import ModelError
 from ..forces import CoordinateSpring, TorsionalSpringDamper
-from ..joints import Prismatic, Revolute
+from ..joints import PointOnLine, Prismatic, Revolute
 from ..mechanism import Mechanism
 from ..model.body import Body
 from ..model.contact import Contact
-from ..model.shapes import Box, Cylinder, Prism, Rod
+from ..model.expressions import number
+from ..model.shapes import Box, Capsule, Cylinder, Prism, Rod, Sphere
 
 GAP = 0.25  # between the plates of two shoes, as a part of the pitch: room for a tooth
 ARM = 0.2  # mass of an arm, as a part of that of its wheel
+HORN, PLAY, GROUSER = 1.0, 0.3, 0.3  # radius of a guide horn, its play, radius of a grouser, as parts of a thickness
 STEEL, RUST, SLATE = "#5b6770", "#a63d2f", "#3a4148"
+UNITS = {
+    "at": "m", "mass": "kg", "radius": "m", "arm": "m", "slide": "", "stiffness": None, "damping": None, "load": "N",
+    "pitch": "m", "thickness": "m", "width": "m", "wheel_width": "m", "friction": "1",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,8 @@ class TrackWheel:
     """A wheel inside a track: by what it has, a sprocket, the idler, a road wheel, or a support roller.
 
     A wheel with ``teeth`` is a sprocket. One with an ``arm`` is a road wheel on a torsion bar. One with a ``slide`` is
-    the idler, whose place closes the track. Any other turns on the hull.
+    the idler, whose place closes the track. Any other turns on the hull. Points and directions are those in the plane
+    of the track: forward, upward. Numbers may be given with units, ``"22 cm"``.
 
     Parameters
     ----------
@@ -73,9 +80,94 @@ class TrackWheel:
         sprung = self.arm is not None or self.slide is not None
         if sprung != (self.stiffness is not None) or (not sprung and (self.damping or self.load)):
             raise ModelError(f"{title}: stiffness belongs to arm or slide, damping and load to stiffness")
+        rotation = self.arm is not None
+        units = UNITS | {"stiffness": "N*m/rad", "damping": "N*m*s/rad"} if rotation else UNITS
+        units = units if rotation else units | {"stiffness": "N/m", "damping": "N*s/m"}
+        for f in ("at", "mass", "radius", "arm", "slide", "stiffness", "damping", "load"):
+            if (x := getattr(self, f)) is not None:
+                object.__setattr__(self, f, plain_numbers(x, units[f], f"{f} of {title}"))
+        if self.teeth is not None:
+            object.__setattr__(self, "teeth", whole_number(self.teeth, f"teeth of {title}"))
         for f in ("mass", "radius", "teeth", "stiffness"):
             if (x := getattr(self, f)) is not None and not x > (4 if f == "teeth" else 0):
                 raise ModelError(f"{title}: {f} is {x:g}; it must be greater than {4 if f == 'teeth' else 0}")
+        if self.damping < 0:
+            raise ModelError(f"{title}: damping is {self.damping:g}; it must not be negative")
+
+
+def plain_numbers(x: Any, unit: str | None, where: str) -> Any:
+    """Return a number, or the two components of a point, in SI units."""
+    if not isinstance(x, (list, tuple, np.ndarray)):
+        return float(number(x, {}, unit, where))
+    if len(x) != 2:
+        raise ModelError(f"{where}: it has two components, in the plane of the track, got {x!r}")
+    return tuple(float(number(c, {}, unit, where)) for c in x)
+
+
+def whole_number(x: Any, where: str) -> int:
+    """Return a count."""
+    if float(number(x, {}, "1", where)) % 1.0 != 0.0:
+        raise ModelError(f"{where} is {x}; give a whole number")
+    return int(x)
+
+
+@dataclass(frozen=True)
+class Shoes:
+    """The shoes of a track: their number, and the sizes [m] and mass [kg] of each."""
+
+    shoes: int
+    pitch: float
+    thickness: float
+    mass: float
+    width: float
+    wheel_width: float
+
+    @property
+    def horn(self) -> float:
+        """Radius of a guide horn [m]."""
+        return HORN * self.thickness
+
+    def shape(self, spatial: bool) -> tuple:
+        """Plate, hinge, and in space two guide horns and a grouser; x along the track, y into it."""
+        p, t, w = self.pitch, self.thickness, self.width
+        plate = Box(edges=((1 - GAP) * p, t, w))
+        hinge = Rod(start=(-p / 2, 0, -w / 2), end=(-p / 2, 0, w / 2), radius=t / 4, looks=True)
+        if not spatial:
+            return plate, hinge
+        r, g = self.horn, GROUSER * t
+        side = self.wheel_width / 2 + PLAY * t + r
+        horns = (Sphere(radius=r, position=(0, t / 2 + r, z)) for z in (-side, side))
+        return plate, hinge, *horns, Capsule(radius=g, length=w - 2 * g, position=(0, -t / 2, 0))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the plane of the track is: the x-y plane of a planar mechanism, or the x-z plane, with z upward."""
+
+    spatial: bool
+
+    def point(self, p: Any) -> tuple[float, ...]:
+        """Return a point or direction of the plane."""
+        x, y = (float(c) for c in p)
+        return (x, 0.0, y) if self.spatial else (x, y)
+
+    def pose(self, p: Any, angle: float = 0.0) -> dict[str, Any]:
+        """Return place and orientation of a body whose z axis is normal to the plane."""
+        if not self.spatial:
+            return {"position": self.point(p), "angle": angle}
+        c, s = cos(angle), sin(angle)
+        return {"position": self.point(p), "orientation": ((c, -s, 0.0), (0.0, 0.0, -1.0), (s, c, 0.0))}
+
+    @property
+    def normal(self) -> dict[str, Any]:
+        """Axis of a hinge: angles have the same sign in plane and space."""
+        return {"axis": (0.0, -1.0, 0.0)} if self.spatial else {}
+
+    def inertia(self, across: float, along: float, axis: tuple[float, float, float]) -> Any:
+        """Return the inertia of a round body, about its axis ``along`` and normal to it ``across``."""
+        u = np.array(axis) / hypot(*axis)
+        J = across * np.eye(3) + (along - across) * np.outer(u, u)
+        return tuple(map(tuple, J.tolist())) if self.spatial else float(J[2, 2])
 
 
 def track(
@@ -89,14 +181,21 @@ def track(
     width: float = 0.3,
     friction: float = 0.3,
     damping: float = 0.0,
+    spatial: bool = False,
+    wheel_width: float | None = None,
 ) -> Mechanism:
-    """Return a track in the plane: shoes, hinged to a closed chain, around wheels on a hull.
+    """Return a track: shoes, hinged to a closed chain, around wheels on a hull.
 
     It is added to a vehicle with ``m.add(track, prefix="left", at=..., on="hull")``: what stands on ground in it stands
     on the hull. The shoes are ``shoe_0``, ``shoe_1``, ..., hinged by ``pin_0``, ``pin_1``, ... The wheel ``w`` turns on
     the joint ``w_axle``; an arm is ``w_arm`` on the joint ``w_pivot`` with the torsion bar ``w_bar``; the idler slides
     with the body ``w_slider`` on the joint ``w_slide`` with the spring ``w_spring``. The sprocket has teeth, which push
     the plates of the shoes: it drives by form. Contact of the shoes with the soil is that of the whole mechanism.
+
+    A spatial track lies in the x-z plane, z upward; axles and pins are parallel to y. Between two horns on each shoe
+    run the wheels, which keep the track in place sideways; a round bar across each shoe, the grouser, touches the
+    ground. All pins are `Revolute` but ``pin_0``, a `PointOnLine`: in a closed chain of parallel hinges the last one
+    has to fix two directions only.
 
     Parameters
     ----------
@@ -114,37 +213,61 @@ def track(
     friction : number [1]
         Between shoes and wheels.
     damping : number [N m s/rad]
-        Of the hinges, where not zero: by ``pin_0_damper``, ...; it calms the free runs.
+        Of the hinges, where not zero: by ``pin_1_damper``, ..., in the plane also ``pin_0_damper``; calms the free runs.
+    spatial : bool
+        Whether the mechanism is spatial.
+    wheel_width : number [m]
+        Of wheels and teeth; the shoe's width in the plane, 0.4 of it in space if not given.
 
     Raises
     ------
     ModelError
         If the number of shoes does not fit around the wheels with the idler within three quarters of a pitch of its
-        place; if there is not exactly one idler; if two wheels have one name.
+        place; if there is not exactly one idler; if two wheels have one name; if a wheel is too small for the shoes, or
+        so far inside the track that it touches none.
     """
-    check_track(name, wheels, shoes=shoes, pitch=pitch, thickness=thickness, mass=mass, width=width)
+    across = (0.4 if spatial else 1.0) * plain_numbers(width, "m", f"track {name!r}: width")
+    links = checked_shoes(
+        name, shoes=shoes, pitch=pitch, thickness=thickness, mass=mass, width=width, wheel_width=wheel_width or across
+    )
+    pitch, thickness = links.pitch, links.thickness
+    damping = plain_numbers(damping, "N*m*s/rad", f"track {name!r}: damping")
+    check_wheels(name, wheels)
+    sizes = [wheel_radius(name, w, pitch, thickness) for w in wheels]
     idler = next(k for k, w in enumerate(wheels) if w.slide is not None)
-    sizes = [wheel_radius(w, pitch, thickness) for w in wheels]
-    shift, pins = closed_chain(name, wheels, sizes, idler, shoes, pitch, thickness)
-    m = Mechanism(name, planar=True)
-    add_shoes(m, pins, pitch, thickness, mass, width)
+    shift, pins = closed_chain(name, wheels, sizes, idler, links.shoes, pitch, thickness)
+    m, frame = Mechanism(name, planar=not spatial), Frame(spatial)
+    add_shoes(m, frame, pins, links)
     for k, (w, r) in enumerate(zip(wheels, sizes, strict=True)):
         at = (w.at[0] + shift[0], w.at[1] + shift[1]) if k == idler else w.at
         nearest = pins[np.argmin(abs(np.hypot(*(pins - at).T) - hypot(r + thickness / 2, pitch / 2)))] - at
-        teeth = () if w.teeth is None else tooth_shapes(w.teeth, atan2(*nearest[::-1]), pitch, thickness, width)
-        add_wheel(m, w, at, r, (Cylinder(radius=r, length=width), *teeth))
+        teeth = () if w.teeth is None else tooth_shapes(w.teeth, atan2(*nearest[::-1]), links)
+        add_wheel(m, frame, w, at, (r, links.wheel_width), teeth)
     if damping:
-        m.add(*(TorsionalSpringDamper(f"pin_{k}_damper", f"pin_{k}", damping=damping) for k in range(shoes)))
-    plates = tuple(f"shoe_{k}" for k in range(shoes))
+        hinges = [f"pin_{k}" for k in range(1 if spatial else 0, links.shoes)]
+        m.add(*(TorsionalSpringDamper(f"{p}_damper", p, damping=damping) for p in hinges))
+    plates = tuple(f"shoe_{k}" for k in range(links.shoes))
     m.add(Contact("wheel_contact", between=plates, others=tuple(w.name for w in wheels), friction=friction))
     return m
 
 
-def check_track(name: str, wheels: Sequence[TrackWheel], **numbers: float) -> None:
-    """Refuse impossible numbers, equal names, and any number of idlers but one."""
-    for key, x in numbers.items():
+def checked_shoes(name: str, *, shoes: Any, **numbers: Any) -> Shoes:
+    """Return the shoes, refusing impossible numbers."""
+    got = {k: plain_numbers(x, UNITS[k], f"track {name!r}: {k}") for k, x in numbers.items()}
+    out = Shoes(whole_number(shoes, f"track {name!r}: shoes"), **got)
+    for key, x in {"shoes": out.shoes, **got}.items():
         if not x > 0:
             raise ModelError(f"track {name!r}: {key} is {x:g}; it must be greater than 0")
+    if out.wheel_width > out.width:
+        raise ModelError(
+            f"track {name!r}: wheel_width is {out.wheel_width:g} m, and the width of the shoes {out.width:g} m; give "
+            f"narrower wheels"
+        )
+    return out
+
+
+def check_wheels(name: str, wheels: Sequence[TrackWheel]) -> None:
+    """Refuse equal names, and any number of idlers but one."""
     names = [w.name for w in wheels]
     if twice := next((n for n in names if names.count(n) > 1), None):
         raise ModelError(f"track {name!r}: two wheels are named {twice!r}; give each a name of its own")
@@ -157,12 +280,20 @@ def check_track(name: str, wheels: Sequence[TrackWheel], **numbers: float) -> No
         )
 
 
-def wheel_radius(w: TrackWheel, pitch: float, thickness: float) -> float:
-    """Return the radius of a wheel [m]: of a sprocket that on which shoes with their pins on the pitch circle lie."""
-    if w.radius is not None:
-        return w.radius
-    assert w.teeth is not None
-    return pitch / (2 * tan(pi / w.teeth)) - thickness / 2
+def wheel_radius(name: str, w: TrackWheel, pitch: float, thickness: float) -> float:
+    """Return the radius of a wheel [m]: of a sprocket that on which shoes with their pins on the pitch circle lie.
+
+    Neighbouring shoes on a wheel turn by 2 atan(pitch / (2 r + thickness)), at most a right angle.
+    """
+    if w.radius is None:
+        assert w.teeth is not None
+        return pitch / (2 * tan(pi / w.teeth)) - thickness / 2
+    if not 2 * w.radius + thickness > pitch:
+        raise ModelError(
+            f"track {name!r}: wheel {w.name!r} of radius {w.radius:g} m is too small for a pitch of {pitch:g} m, since "
+            f"shoes on it would turn by more than 90 deg; give a radius above {(pitch - thickness) / 2:g} m"
+        )
+    return w.radius
 
 
 def closed_chain(
@@ -193,6 +324,7 @@ def closed_chain(
         )
         return chords(arcs, start, pitch, shoes)
 
+    refuse_inner_wheels(name, wheels, radii, pitch)
     reach = 0.75 * pitch
     inner, outer = chain(-reach)[1], chain(reach)[1]
     if not inner > 0 > outer:
@@ -205,13 +337,28 @@ def closed_chain(
     return (x * unit[0], x * unit[1]), chain(x)[0]
 
 
-def tooth_shapes(teeth: int, phase: float, pitch: float, thickness: float, width: float) -> tuple[Prism, ...]:
+def refuse_inner_wheels(name: str, wheels: Sequence[TrackWheel], radii: Sequence[float], pitch: float) -> None:
+    """Refuse a wheel that is farther inside the band than one pitch: no run that sags or swings touches it."""
+    for k, w in enumerate(wheels):
+        others = [(v.at, r) for v, r in zip(wheels, radii, strict=True) if v is not w]
+        arcs = taut_band([w.at, *(at for at, _ in others)], [radii[k], *(r for _, r in others)])
+        if any(a.circle == 0 for a in arcs):
+            continue
+        nearest = min(band_distance(a, w.at) for a in arcs) - radii[k]
+        if nearest > pitch:
+            raise ModelError(
+                f"track {name!r}: wheel {w.name!r} is {nearest:.3g} m inside the track and touches no shoe; move it "
+                f"outwards, or leave it out"
+            )
+
+
+def tooth_shapes(teeth: int, phase: float, links: Shoes) -> tuple[Prism, ...]:
     """Return the teeth of a sprocket, tapered, from its hub to beyond the pitch circle; one points along the phase.
 
     The plates of two shoes on the sprocket leave free, on each side of the line from its centre to their common pin,
     (gap cos a - thickness sin a) / 2 with a = pi / teeth. A tooth takes nine tenths of it.
     """
-    half = pi / teeth
+    half, pitch, thickness = pi / teeth, links.pitch, links.thickness
     room = 0.45 * (GAP * pitch * cos(half) - thickness * sin(half))
     if room <= 0:
         raise ModelError(
@@ -224,46 +371,59 @@ def tooth_shapes(teeth: int, phase: float, pitch: float, thickness: float, width
     out = []
     for k in range(teeth):
         c, s = cos(phase + 2 * half * k), sin(phase + 2 * half * k)
-        out.append(Prism(outline=tuple(map(tuple, (outline @ [[c, s], [-s, c]]).tolist())), thickness=width))
+        out.append(
+            Prism(outline=tuple(map(tuple, (outline @ [[c, s], [-s, c]]).tolist())), thickness=links.wheel_width)
+        )
     return tuple(out)
 
 
-def add_shoes(m: Mechanism, pins: np.ndarray, pitch: float, thickness: float, mass: float, width: float) -> None:
+def add_shoes(m: Mechanism, frame: Frame, pins: np.ndarray, links: Shoes) -> None:
     """Add the shoes and their hinges."""
-    number = len(pins)
+    number, shape = len(pins), links.shape(frame.spatial)
     for k, (a, b) in enumerate(zip(pins, np.roll(pins, -1, axis=0), strict=True)):
-        angle = atan2(b[1] - a[1], b[0] - a[0])
-        plate = Box(edges=((1 - GAP) * pitch, thickness, width))
-        hinge = Rod(start=(-pitch / 2, 0, -width / 2), end=(-pitch / 2, 0, width / 2), radius=thickness / 4, looks=True)
-        middle = tuple(((a + b) / 2).tolist())
-        m.add(Body(f"shoe_{k}", mass=mass, shape=(plate, hinge), color=STEEL, position=middle, angle=angle))
+        pose = frame.pose((a + b) / 2, atan2(b[1] - a[1], b[0] - a[0]))
+        m.add(Body(f"shoe_{k}", mass=links.mass, shape=shape, color=STEEL, **pose))
     for k, p in enumerate(pins):
-        m.add(Revolute(f"pin_{k}", f"shoe_{(k - 1) % number}", f"shoe_{k}", at=tuple(p.tolist())))
+        joint = PointOnLine if frame.spatial and k == 0 else Revolute
+        m.add(joint(f"pin_{k}", f"shoe_{(k - 1) % number}", f"shoe_{k}", at=frame.point(p), **frame.normal))
 
 
-def add_wheel(m: Mechanism, w: TrackWheel, at: tuple[float, float], radius: float, shape: tuple) -> None:
-    """Add a wheel with what carries it."""
-    m.add(Body(w.name, mass=w.mass, inertia=w.mass * radius**2 / 2, position=at, shape=shape, color=SLATE))
+def add_wheel(
+    m: Mechanism,
+    frame: Frame,
+    w: TrackWheel,
+    at: tuple[float, float],
+    size: tuple[float, float],
+    teeth: tuple[Prism, ...],
+) -> None:
+    """Add a wheel of a radius and width with what carries it."""
+    (radius, width), normal = size, (0.0, 0.0, 1.0)
+    moments = w.mass * (3 * radius**2 + width**2) / 12, w.mass * radius**2 / 2
+    shape = (Cylinder(radius=radius, length=width), *teeth)
+    inertia = frame.inertia(*moments, normal)
+    m.add(Body(w.name, mass=w.mass, inertia=inertia, shape=shape, color=SLATE, **frame.pose(at)))
     n, carrier, hub, stiffness = w.name, "ground", 0.3 * radius, w.stiffness or 0.0
+    mass = ARM * w.mass
     if w.arm is not None:
         carrier = f"{n}_arm"
-        lever = (w.arm[0] - at[0], w.arm[1] - at[1])
-        mass, span = ARM * w.mass, hypot(*lever)
-        middle = ((at[0] + w.arm[0]) / 2, (at[1] + w.arm[1]) / 2)
-        rod = Rod(start=(-lever[0] / 2, -lever[1] / 2), end=(lever[0] / 2, lever[1] / 2), radius=hub / 2, looks=True)
-        m.add(Body(carrier, mass=mass, inertia=mass * span**2 / 12, position=middle, shape=rod, color=RUST))
-        m.add(Revolute(f"{n}_pivot", "ground", carrier, at=w.arm))
+        lever = (w.arm[0] - at[0], w.arm[1] - at[1], 0.0)
+        span, middle = hypot(*lever), ((at[0] + w.arm[0]) / 2, (at[1] + w.arm[1]) / 2)
+        end = (lever[0] / 2, lever[1] / 2, 0.0)
+        rod = Rod(start=(-end[0], -end[1], 0.0), end=end, radius=hub / 2, looks=True)
+        inertia = frame.inertia(mass * (span**2 / 12 + hub**2 / 16), mass * hub**2 / 8, lever)
+        m.add(Body(carrier, mass=mass, inertia=inertia, shape=rod, color=RUST, **frame.pose(middle)))
+        m.add(Revolute(f"{n}_pivot", "ground", carrier, at=frame.point(w.arm), **frame.normal))
         free = lever[0] * w.load / stiffness
         m.add(TorsionalSpringDamper(f"{n}_bar", f"{n}_pivot", stiffness=stiffness, damping=w.damping, angle=free))
     elif w.slide is not None:
         carrier = f"{n}_slider"
-        mass = ARM * w.mass
         block = Box(edges=(hub, hub, hub), looks=True)
-        m.add(Body(carrier, mass=mass, inertia=mass * hub**2 / 6, position=at, shape=block, color=RUST))
-        m.add(Prismatic(f"{n}_slide", "ground", carrier, at=at, axis=w.slide))
+        inertia = frame.inertia(mass * hub**2 / 6, mass * hub**2 / 6, normal)
+        m.add(Body(carrier, mass=mass, inertia=inertia, shape=block, color=RUST, **frame.pose(at)))
+        m.add(Prismatic(f"{n}_slide", "ground", carrier, at=frame.point(at), axis=frame.point(w.slide)))
         spring: Any = {"stiffness": stiffness, "damping": w.damping, "rest": w.load / stiffness}
         m.add(CoordinateSpring(f"{n}_spring", f"{n}_slide.displacement", **spring))
-    m.add(Revolute(f"{n}_axle", carrier, n, at=at))
+    m.add(Revolute(f"{n}_axle", carrier, n, at=frame.point(at), **frame.normal))
 
 
 # Closed chains of equal chords around circles: where the pins of a track lie.
@@ -318,6 +478,12 @@ def taut_band(centres: Sequence[tuple[float, float]], radii: Sequence[float]) ->
         arcs.append(Arc(here, centres[here], radii[here], angle, angle + turn, straight))
         here, angle = there, angle + turn
     return arcs
+
+
+def band_distance(arc: Arc, at: tuple[float, float]) -> float:
+    """Return the distance of a point inside the band from the straight after an arc [m]."""
+    normal = (cos(arc.last), sin(arc.last))
+    return arc.radius + sum(n * (c - x) for n, c, x in zip(normal, arc.centre, at, strict=True))
 
 
 def chords(arcs: Sequence[Arc], start: float, pitch: float, number: int) -> tuple[np.ndarray, float]:

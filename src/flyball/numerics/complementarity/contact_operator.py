@@ -34,14 +34,26 @@ def point_velocity(v, i, P, c, side):
 @formula
 def contact_velocity(P, v, wide, c):
     """D v of contact c [m/s], without bias: velocity of side 2 minus that of side 1."""
+    u = node_velocity(P, v, c)
+    return add(u, group_velocity(P, wide, c, 0)) if is_in_group(P, c) else u
+
+
+@formula
+def is_in_group(P, c):
+    """Whether a side of contact c is in a group."""
+    return P.at[c, 0] < FIXED_SIDE or P.at[c, 1] < FIXED_SIDE
+
+
+@formula
+def node_velocity(P, v, c):
+    """Contribution of the nodes to `contact_velocity`."""
     i, j = P.at[c, 0], P.at[c, 1]
     u = (0.0, 0.0, 0.0)
     if j >= 0:
         u = point_velocity(v, j, P, c, 1)
     if i >= 0:
         u = sub(u, point_velocity(v, i, P, c, 0))
-    u = to_contact_frame(P, c, u)
-    return add(u, group_velocity(P, wide, c, 0)) if i < FIXED_SIDE or j < FIXED_SIDE else u
+    return to_contact_frame(P, c, u)
 
 
 @formula
@@ -77,7 +89,7 @@ def group_velocity(P, wide, c, first):
 
 @formula
 def apply_to_groups(P, wide, c, first, p):
-    """Change the groups' velocities by three impulses p of a contact."""
+    """Change the velocities of groups by three impulses p of a contact; zeros, as in a plane, cost nothing."""
     for side in range(2):
         e = P.block[c, side]
         if P.at[c, side] < FIXED_SIDE and e >= 0:
@@ -85,9 +97,18 @@ def apply_to_groups(P, wide, c, first, p):
             w, n = P.group[g], P.group[g + 1] - P.group[g]
             e += first * n
             sign = 2.0 * side - 1.0
-            a, b, d = sign * p[0], sign * p[1], sign * p[2]
-            for k in range(n):
-                wide[w + k] += P.Y[e + k] * a + P.Y[e + n + k] * b + P.Y[e + 2 * n + k] * d
+            for r in range(3):
+                a = sign * p[r]
+                if a != 0.0:
+                    add_multiple(wide[w : w + n], a, P.Y[e : e + n])
+                e += n
+
+
+@formula
+def add_multiple(x, a, y):
+    """X += a y, for arrays of one length."""
+    for k in range(x.shape[0]):
+        x[k] += a * y[k]
 
 
 @formula
@@ -175,9 +196,8 @@ def line_velocity(P, wide, k):
 def apply_line_impulse(P, wide, k, p):
     """Change the velocities by the impulse p of line k."""
     g, e = P.line_at[k, 0], P.line_at[k, 1]
-    w = P.group[g]
-    for s in range(P.group[g + 1] - w):
-        wide[w + s] += P.Y[e + s] * p
+    w, n = P.group[g], P.group[g + 1] - P.group[g]
+    add_multiple(wide[w : w + n], p, P.Y[e : e + n])
 
 
 @formula

@@ -6,8 +6,8 @@ Rows belong to its contacts; single rows to stops, ropes and joint friction:
 - Rope: it is taut or slack within one step, and treated implicitly as springs are.
 - Friction: bounded by its own law, at the load that follows from the reactions of the last step.
 
-The response to a row's impulse is one solve with the factor of the joints. Groups are independent of each other, so
-that one solve gives the response of a row of each group.
+The response to a row's impulse is one solve with the factor of the joints, for several rows at once. Groups are
+independent of each other, so that one solve gives the response of a row of each group.
 
 Springs and dampers are treated implicitly, as a low-rank addition to the mass matrix. A force s along J v, with
 stiffness k and damping c, is taken at
@@ -32,12 +32,13 @@ from ...engine.calls import POSITION, SLOPES, SOLVE
 from ...engine.kinematics import load_record, project_wrench, retract
 from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
 from ...engine.residual import DAMPING, DIRECTIONS, STIFFNESS, probe_direction
-from ...engine.solve import apply_inverse_mass
+from ...engine.solve import apply_inverse_mass, factor_schur
 from ...math.rotation import rotation_vector
 from ...math.scalar import sqrt
 from ...math.vec import add, col, dot, load3, mm, norm, sub, transpose
 from ...numerics.complementarity.contact_problem import FIXED_SIDE
-from ...tables.table_definitions import SCHUR
+from ...numerics.sparse_factorisation import COLUMNS, add_columns, ldl_solve_columns, load_columns, store_columns
+from ...tables.table_definitions import SCHUR, STEP
 from .stepping_tables import LINE_FRICTION, LINE_ROPE, LINE_STOP, TABLES_FULL
 
 SOFT_SPRING = 1e-3  # h^2 k / m + h c / m below which a spring is evaluated explicitly at half the step
@@ -577,50 +578,114 @@ def side_rows(A, P, c, where, point, rows):
 
 @formula
 def row_responses(A, P):
-    """Compute the responses Y to all queued rows: one row of each group per solve."""
-    force, out = A.velocities.impulse, A.velocities.impulsive
-    busy = True
-    while busy:
-        busy = False
-        for i in range(6):
-            asked = fill_impulses(A, P, i, force)
-            if asked == 0:
-                break
-            busy = True
-            impulse_response(A, force, out)
-            with_spring_response(A, out)
-            read_responses(A, P, i, out)
-        for g in range(A.queue.shape[0]):
-            if A.queue[g] >= 0:
-                A.queue[g] = A.job.next[A.queue[g]]
+    """Compute the responses Y to all queued rows, `COLUMNS` at once, with one row of each group in a column."""
+    schur = is_solved_by_schur(A)
+    if schur:
+        factor_schur(A.S, A.W)
+    for g in range(A.queue.shape[0]):
+        A.queued_row[g] = 0
+    columns = queue_columns(A, P)
+    while columns > 0:
+        if schur:
+            solve_columns(A)
+        for c in range(columns):
+            if not schur:
+                fill_impulses(A, P, c)
+                impulse_response(A, A.velocities.impulse, A.velocities.impulsive)
+            else:
+                for d in range(A.response.shape[0]):
+                    A.velocities.impulsive[d] = A.response[d, c]
+            with_spring_response(A, A.velocities.impulsive)
+            read_responses(A, P, c)
+        columns = queue_columns(A, P)
 
 
 @formula
-def fill_impulses(A, P, i, force):
-    """Set the impulse of row i of the next job of each group; return how many groups have one."""
-    asked = 0
+def is_solved_by_schur(A):
+    """Return whether responses follow from the factor of G M^-1 G^T without refinement, and without generated code."""
+    return A.S.sizes.solver == SCHUR and A.W.generated[STEP] == 0 and not A.S.scales.semidefinite > 0.0
+
+
+@formula
+def queue_columns(A, P):
+    """Take the next rows of all groups, and fill the columns with their responses without joints, M^-1 J^T.
+
+    Returns the number of columns.
+    """
+    columns = 0
+    while columns < COLUMNS:
+        used = False
+        for g in range(A.queue.shape[0]):
+            A.column[g, columns] = next_row(A, P, g)
+            used = used or A.column[g, columns] >= 0
+        if not used:
+            break
+        fill_impulses(A, P, columns)
+        if is_solved_by_schur(A):
+            for b in range(A.S.tree.parent.shape[0]):
+                apply_inverse_mass(A.S, b, A.velocities.impulse, A.S.tree.v[b], A.velocities.impulsive, A.S.tree.v[b])
+            for d in range(A.response.shape[0]):
+                A.response[d, columns] = A.velocities.impulsive[d]
+        columns += 1
+    for c in range(columns, COLUMNS):
+        for d in range(A.response.shape[0]):
+            A.response[d, c] = 0.0
+    return columns
+
+
+@formula
+def next_row(A, P, g):
+    """Return the start of the next row of group g whose response is not zero, or -1 if there is none left."""
+    n = A.group[g + 1] - A.group[g]
+    while A.queue[g] >= 0:
+        k = A.queue[g]
+        at = A.job.first[k] + A.queued_row[g] * n
+        A.queued_row[g] += 1
+        if A.queued_row[g] == A.job.rows[k]:
+            A.queue[g], A.queued_row[g] = A.job.next[k], 0
+        for d in range(n):
+            if P.J[at + d] != 0.0:
+                return at
+        for d in range(n):
+            P.Y[at + d] = 0.0
+    return -1
+
+
+@formula
+def fill_impulses(A, P, c):
+    """Set the impulses of the rows in column c."""
+    force = A.velocities.impulse
     for d in range(force.shape[0]):
         force[d] = 0.0
     for g in range(A.queue.shape[0]):
-        k = A.queue[g]
-        if k >= 0 and i < A.job.rows[k]:
-            asked += 1
-            a = A.group[g]
-            n = A.group[g + 1] - a
-            at = A.job.first[k] + i * n
-            for d in range(n):
+        at, a = A.column[g, c], A.group[g]
+        if at >= 0:
+            for d in range(A.group[g + 1] - a):
                 force[a + d] = P.J[at + d]
-    return asked
 
 
 @formula
-def read_responses(A, P, i, out):
-    """Read the responses to the impulses of `fill_impulses`."""
+def solve_columns(A):
+    """Change responses without joints to those with joints: x + M^-1 G^T z with G M^-1 G^T z = -G x."""
+    x, z, first, column, place = A.response, A.response_impulse, A.S.row_start, A.S.column, A.S.ldl.perm
+    G, H = A.W.G, A.W.H
+    for k in range(z.shape[0]):
+        s = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for e in range(first[k], first[k + 1]):
+            s = add_columns(s, -G[e], load_columns(x, column[e]))
+        store_columns(z, place[k], s)
+    ldl_solve_columns(A.S.ldl, A.W.L, A.W.ldl.inverse_diagonal, z)
+    for k in range(z.shape[0]):
+        s = load_columns(z, place[k])
+        for e in range(first[k], first[k + 1]):
+            store_columns(x, column[e], add_columns(load_columns(x, column[e]), H[e], s))
+
+
+@formula
+def read_responses(A, P, c):
+    """Read the responses to the rows in column c."""
     for g in range(A.queue.shape[0]):
-        k = A.queue[g]
-        if k >= 0 and i < A.job.rows[k]:
-            a = A.group[g]
-            n = A.group[g + 1] - a
-            at = A.job.first[k] + i * n
-            for d in range(n):
-                P.Y[at + d] = out[a + d]
+        at, a = A.column[g, c], A.group[g]
+        if at >= 0:
+            for d in range(A.group[g + 1] - a):
+                P.Y[at + d] = A.velocities.impulsive[a + d]

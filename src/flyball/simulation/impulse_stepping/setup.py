@@ -31,6 +31,7 @@ from ...model.model import Model
 from ...model.names import curve_parts
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
+from ...numerics.sparse_factorisation import COLUMNS
 from ...results.events import cumulative_exchanges, energies_at_end
 from ...results.health import Health
 from ...results.result import Result
@@ -216,7 +217,7 @@ class BodyPartition:
     free : tuple of str
         Bodies and sets of bodies on which only gravity and contact act.
     held : tuple of str
-        The other bodies.
+        The other bodies, those of one group after each other; see `velocity_groups`.
     """
 
     free: tuple[str, ...]
@@ -236,8 +237,12 @@ def partition_bodies(model: Model, values: Values) -> BodyPartition:
             f"{model.bulk[0].title}: sets of bodies need constant gravity, and that of {model.name!r} is a law of "
             f"time; add each body as a Body"
         )
-    held = tuple(b.name for b in model.bodies if changing or place[b.name] in used)
-    return BodyPartition((*(b.name for b in model.bodies if b.name not in held), *(b.name for b in model.bulk)), held)
+    held = [b.name for b in model.bodies if changing or place[b.name] in used]
+    of, movers = connected_velocities(S, values.structure.nv)
+    held.sort(key=lambda name: next((of[d] for d in movers[place[name]]), -1) if place[name] >= 0 else -1)
+    return BodyPartition(
+        (*(b.name for b in model.bodies if b.name not in held), *(b.name for b in model.bulk)), tuple(held)
+    )
 
 
 StopBounds = tuple[float, float, float]
@@ -288,6 +293,8 @@ def mechanism_tables(
         weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
         line=line, line_law=law, active=ActiveRows.blank(2 * len(line)),
         job=Jobs.blank(0), queue=np.zeros(len(group) - 1, np.int64),
+        queued_row=np.zeros(len(group) - 1, np.int64), column=np.zeros((len(group) - 1, COLUMNS), np.int64),
+        response=np.zeros((s.nv, COLUMNS)), response_impulse=np.zeros((len(S.rows.law), COLUMNS)),
         pose=np.zeros((len(rows), 12)),
     )  # fmt: skip
     A.count.first = first
@@ -329,8 +336,20 @@ def force_directions(force) -> int:
 def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the group of each row of the body table (-1: immovable), and the start of each group's velocities.
 
-    Groups are connected by rows, measured quantities and forces. All velocities form one group if those of some group
-    are not contiguous.
+    All velocities form one group if those of some group are not contiguous.
+    """
+    of, movers = connected_velocities(S, nv)
+    first = np.flatnonzero(np.r_[True, of[1:] != of[:-1]]) if nv else np.zeros(0, np.int64)
+    if len(first) != len(np.unique(of)):
+        of, first = np.zeros(nv, np.int64), np.zeros(1, np.int64)
+    number = np.searchsorted(first, np.arange(nv), side="right") - 1
+    return np.array([number[m[0]] if m else -1 for m in movers], np.int64), np.r_[first, nv].astype(np.int64)
+
+
+def connected_velocities(S: System, nv: int) -> tuple[np.ndarray, list[list[int]]]:
+    """Return the first velocity connected to each velocity, and the velocities that move each row of the body table.
+
+    Rows, measured quantities and forces connect velocities.
     """
     part = np.arange(nv)
 
@@ -353,12 +372,7 @@ def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
     for k in np.flatnonzero(S.forces.family == BETWEEN):
         ends = [S.frame_body[S.forces.F[k]], S.frame_body[S.forces.M[k]]]
         join(d for b in ends if b >= 0 for d in movers[b])
-    of = np.array([root(d) for d in range(nv)], np.int64)
-    first = np.flatnonzero(np.r_[True, of[1:] != of[:-1]]) if nv else np.zeros(0, np.int64)
-    if len(first) != len(np.unique(of)):
-        of, first = np.zeros(nv, np.int64), np.zeros(1, np.int64)
-    number = np.searchsorted(first, np.arange(nv), side="right") - 1
-    return np.array([number[m[0]] if m else -1 for m in movers], np.int64), np.r_[first, nv].astype(np.int64)
+    return np.array([root(d) for d in range(nv)], np.int64), movers
 
 
 def _moving_velocities(S: System, b: int) -> list[int]:
@@ -538,8 +552,8 @@ def stop_bounds(model: Model, values: Values) -> dict[str, StopBounds]:
 
 
 def mechanism_model(model: Model, held: Sequence[str]) -> Model:
-    """Return the part of a model (stops replaced by springs) that concerns the bodies ``held``, without contact
-    shapes.
+    """Return the part of a model (stops replaced by springs) that concerns the bodies ``held``, in this order, without
+    contact shapes.
     """
     out = model.copy()
     gone = {b.name for b in out.bodies} - set(held)
@@ -547,7 +561,7 @@ def mechanism_model(model: Model, held: Sequence[str]) -> Model:
     for name in ("contacts", "bulk", "ground", "materials", "material_pairs"):
         gone |= {e.name for e in getattr(out, name)}
         setattr(out, name, [])
-    out.bodies = [b for b in out.bodies if b.name not in gone]
+    out.bodies = [out.by_name[name] for name in held]
     out.frames = [f for f in out.frames if f.name not in gone]
     out.initial = [e for e in out.initial if curve_parts(e.name)[0] not in gone]
     lost = [s for s in out.sensors if any(body in gone for body in _sensor_bodies(s))]

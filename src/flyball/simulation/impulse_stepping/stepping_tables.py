@@ -334,6 +334,10 @@ class MechanismTables(NamedTuple):
     active: ActiveRows  # (2 lines)
     job: Jobs  # (2 contacts + lines)
     queue: Int1  # (ng,): the next job of each group
+    queued_row: Int1  # (ng,): the next row of that job
+    column: Int2  # (ng, COLUMNS): start of the row of each group whose response is in a column of ``response``, or -1
+    response: Float2  # (nv, COLUMNS): responses that are computed together
+    response_impulse: Float2  # (nr, COLUMNS): impulses of the joints in them
     pose: Float2  # (movers, 12): before the projection onto the joints
 
 
