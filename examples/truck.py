@@ -1,8 +1,9 @@
 """A truck of 17 bodies on 4 tyres: over a ramp, through a lane change with a driver, on a rough road.
 
-Frame, cab, engine, bed and seat on rubber mounts; two axle beams on springs and radius rods; steered front wheels; a
-driver who looks ahead and steers towards a path, and holds the speed with the rear wheels. Run it with
-``flyball run examples/truck.py --t-end 6 --out out``, or as it is, for a table of figures.
+Frame, cab, engine, bed and seat on rubber mounts; two axle beams on springs and radius rods; front wheels on universal
+joints, kingpin and spin; an engine with its map, a gear box and a differential; a driver who looks ahead, steers along
+a path and holds the speed with both pedals. Run it with ``flyball run examples/truck.py --t-end 6 --out out``, or as it
+is, for a table of figures.
 """
 
 from __future__ import annotations
@@ -17,9 +18,20 @@ TYRE = fb.FialaTyre(
     friction=0.8, relaxation_length=0.3, lateral_relaxation_length=0.5, trail=0.05, rolling_resistance=0.006,
 )  # fmt: skip
 RAMP = 0.2  # height [m]
-AHEAD = 20.0  # distance at which the driver looks [m]
 SIDES = {"left": 1, "right": -1}
 AXLES = {"front": 2.4, "rear": -2.0}  # places along the frame [m]
+WHEELBASE = AXLES["front"] - AXLES["rear"]
+FINAL, RATIOS = 4.0, (6.5, 3.9, 2.4, 1.5, 1.0)  # of the differential, of the gear box
+ENGINE = {  # torques [N m] at speeds and throttles; closed, it brakes
+    "speeds": (0, 600, 1000, 1400, 1800, 2200, 2600),
+    "throttles": (0, 0.3, 0.6, 1),
+    "torques": (
+        (0, 40, 80, 120), (-40, 120, 280, 400), (-55, 200, 480, 780), (-70, 220, 520, 850), (-85, 190, 480, 800),
+        (-100, 140, 400, 680), (-120, 40, 200, 380),
+    ),
+    "speed_unit": "rpm",
+    "limit": "2600 rpm",
+}  # fmt: skip
 
 
 def ramp(spacing: float = 0.05) -> fb.RoadProfile:
@@ -31,8 +43,8 @@ def ramp(spacing: float = 0.05) -> fb.RoadProfile:
 
 
 def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 8.0, lane: float = 0.0) -> fb.Mechanism:
-    """The truck; ``lane``: how far to the left the driver changes at x = 30 m [m]."""
-    m = fb.Mechanism("truck", gravity=(0, 0, -9.81), parameters={"v": speed, "lane": lane})
+    """The truck; ``lane``: how far to the left the driver changes near x = 45 m [m]."""
+    m = fb.Mechanism("truck", gravity=(0, 0, -9.81), parameters={"v": speed})
     m.add(fb.Road("road", surface=surface))
     if isinstance(surface, fb.RoadProfile):  # to be seen
         x = surface.heights[::10]
@@ -62,11 +74,36 @@ def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 
             mount("frame", "bed", (x, 0.6 * s, 1.2), 2e6, 1e4)
         for x in (2.2, 2.6):
             mount("cab", "seat", (x, 0.5 + 0.2 * s, 1.8), 4e3, 2e2)
-    m.add(fb.Frame("eyes", "frame", position=(AHEAD, 0, 0)))
-    m.add(fb.Sensor("eyes_x", "eyes.x"), fb.Sensor("eyes_y", "eyes.y"), fb.Sensor("pace", "frame.vx"))
+    _driver(m, lane)
     for axle in AXLES:
         _axle(m, axle, body, mount)
+    _driveline(m, body, speed)
     return m
+
+
+def _driver(m: fb.Mechanism, lane: float) -> None:
+    """Who holds the speed by throttle and brake, and steers along a path."""
+    x = np.arange(-10.0, 300.0, 5.0)
+    path = np.c_[x, lane * (0.5 + 0.5 * np.tanh((x - 45.0) / 12.0))]
+    m.add(fb.SpeedDriver("pedals", setpoint="v", measured="frame.vx", kp=0.5, ki=0.1, initial=0.1))
+    m.add(fb.Lag("pressure", of="pedals.brake", time=0.1))
+    m.add(fb.PathDriver("steers", "frame", path=path, rear=(AXLES["rear"], 0, 0), wheelbase=WHEELBASE, start=8.0))
+
+
+def _driveline(m: fb.Mechanism, body, speed: float) -> None:
+    """Crankshaft and output shaft in the engine, gear box between them, differential to the rear wheels."""
+    rate = FINAL * speed / (RADIUS - 0.01)  # of the output shaft [rad/s]
+    gear = next((k for k, r in enumerate(RATIOS, 1) if r * rate < 220.0), len(RATIOS)) if speed else 0
+    shafts = (("crank", 60, 2.5, 2.3, RATIOS[gear - 1] * rate), ("output", 30, 0.2, 1.7, rate))
+    disc = fb.Cylinder(radius=0.2, length=0.1, orientation=(0, "90 deg", 0))
+    for name, mass, inertia, x, turns in shafts:
+        body(name, mass, (inertia,) * 3, (x, 0, 1.0), angular_velocity=(turns, 0, 0), shape=disc)
+        m.add(fb.Revolute(f"{name}_bearing", "engine", name, at=(x, 0, 1.0), axis=(1, 0, 0)))
+    m.add(fb.EngineMap("diesel", "crank_bearing", throttle="pedals.throttle", **ENGINE))
+    angles = ("crank_bearing.angle", "output_bearing.angle")
+    m.add(fb.GearBox("box", *angles, ratios=RATIOS, capacity=1500, gear=gear, up="2200 rpm", down="1000 rpm"))
+    spins = tuple(f"spin rear {side}.angle" for side in SIDES)
+    m.add(fb.Coupler("differential", ("output_bearing.angle", *spins), weights=(1, -FINAL / 2, -FINAL / 2)))
 
 
 def _axle(m: fb.Mechanism, axle: str, body, mount) -> None:
@@ -92,22 +129,21 @@ def _axle(m: fb.Mechanism, axle: str, body, mount) -> None:
 
 
 def _wheel(m: fb.Mechanism, axle: str, side: str, body) -> None:
-    """A wheel with its tyre: in front on a knuckle that the driver turns, behind driven."""
-    x, s, front = AXLES[axle], SIDES[side], axle == "front"
-    wheel, carrier, height = f"{axle} {side}", f"{axle} axle", RADIUS - 0.03
-    if front:
-        carrier = f"knuckle {side}"
-        at = (x, 0.95 * s, height)
-        body(carrier, 40, (2, 2, 2), at)
-        m.add(fb.Revolute(f"kingpin {side}", "front axle", carrier, at=at, axis=(0, 0, 1)))
-        torque = "2e5*(0.3*tanh(0.05*(lane*(0.5 + 0.5*tanh((eyes_x - 45)/8)) - eyes_y)) - angle)"
-        m.add(fb.TorsionalSpringDamper(f"steering {side}", f"kingpin {side}", damping=2e3, torque=torque))
-    at = (x, 1.0 * s, height)
+    """A wheel with its tyre and brake: in front on kingpin and spin axis, which the driver turns, behind driven."""
+    front = axle == "front"
+    wheel, at = f"{axle} {side}", (AXLES[axle], 1.0 * SIDES[side], RADIUS - 0.03)
     turned = fb.Cylinder(radius=0.97 * RADIUS, length=0.3, orientation=("90 deg", 0, 0))
-    body(wheel, 90, (6, 11, 6), at, angular_velocity=(0, f"v/{RADIUS - 0.01}", 0), shape=turned)
-    m.add(fb.Revolute(f"spin {wheel}", carrier, wheel, at=at, axis=(0, 1, 0)))
-    if not front:
-        m.add(fb.Motor(f"drive {wheel}", f"spin {wheel}", torque="1e4*(v - pace)"))
+    body(wheel, 130 if front else 90, (8, 11, 8) if front else (6, 11, 6), at,
+         angular_velocity=(0, f"v/{RADIUS - 0.01}", 0), shape=turned)  # fmt: skip
+    if front:
+        m.add(fb.Universal(f"hub {side}", "front axle", wheel, at=at, axes=((0, 0, 1), (0, 1, 0))))
+        steering = {"stiffness": 2e5, "damping": 2e3, "force": "2e5*steers"}
+        m.add(fb.CoordinateSpring(f"steering {side}", f"hub {side}.angle_1", **steering))
+        spin = f"hub {side}.angle_2"
+    else:
+        m.add(fb.Revolute(f"spin {wheel}", "rear axle", wheel, at=at, axis=(0, 1, 0)))
+        spin = f"spin {wheel}.angle"
+    m.add(fb.Actuator(f"brake {wheel}", spin, force="-9e3*pressure*tanh(rate/0.2)"))
     m.add(fb.Tyre(f"tyre {wheel}", "road", wheel, model=TYRE))
 
 

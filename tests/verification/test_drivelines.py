@@ -7,7 +7,9 @@ import pytest
 
 import flyball as fb
 
-RATIOS, ENGINE, MASS, RADIUS = (4.0, 2.0, 1.0), 0.3, 1500.0, 0.3  # ratios, inertia [kg m^2], mass [kg], radius [m]
+RATIOS, ENGINE, CAR, RADIUS = (4.0, 2.0, 1.0), 0.3, 1500.0, 0.3  # ratios, inertia [kg m^2], mass [kg], radius [m]
+SHAFT = 0.02  # kg m^2
+MASS = CAR + SHAFT / RADIUS**2  # of the vehicle with its shaft
 RPM = np.pi / 30
 
 
@@ -15,10 +17,10 @@ def car(torque=100.0, throttle="1", speed=0.0, gear=1, drag=0.0, capacity=1000.0
     """A point-mass vehicle on its driveline: crank, gear box, shaft, and wheels as a rack and pinion."""
     m = fb.Mechanism("driveline", planar=True, gravity=(0, 0), parameters={"drag": drag})
     start = RATIOS[max(gear, 1) - 1] * speed / RADIUS
-    for k, (name, inertia, rate) in enumerate((("crank", ENGINE, start), ("shaft", 1e-9, speed / RADIUS))):
+    for k, (name, inertia, rate) in enumerate((("crank", ENGINE, start), ("shaft", SHAFT, speed / RADIUS))):
         m.add(fb.Body(name, mass=1, inertia=inertia, position=(k, 0), angular_velocity=rate))
         m.add(fb.Revolute(f"{name}_joint", "ground", name, at=(k, 0)))
-    m.add(fb.Body("car", mass=MASS, inertia=1, position=(0, 1), velocity=(speed, 0)))
+    m.add(fb.Body("car", mass=CAR, inertia=1, position=(0, 1), velocity=(speed, 0)))
     m.add(fb.Prismatic("way", "ground", "car", at=(0, 1), axis=(1, 0)))
     m.add(fb.Coupler("wheels", ("way.displacement", "shaft_joint.angle"), weights=(1, -RADIUS)))
     m.add(fb.Actuator("air", "way.displacement", force="-drag*rate*abs(rate)"))
@@ -103,7 +105,7 @@ def test_idle_speed_and_limiter():
 def driven(**driver):
     """A mass that a driver accelerates and brakes with at most 6 kN."""
     m = fb.Mechanism("driver", planar=True, gravity=(0, 0), parameters={"goal": 20.0})
-    m.add(fb.Body("car", mass=MASS, inertia=1, position=(0, 0)))
+    m.add(fb.Body("car", mass=CAR, inertia=1, position=(0, 0)))
     m.add(fb.Prismatic("way", "ground", "car", at=(0, 0), axis=(1, 0)))
     m.add(fb.SpeedDriver("driver", setpoint="goal", measured="car.vx", **({"kp": 0.5, "ki": 0.1} | driver)))
     m.add(fb.Actuator("force", "way.displacement", force="6000*(driver.throttle - driver.brake)"))
@@ -112,7 +114,7 @@ def driven(**driver):
 
 def test_speed_driver_is_its_linear_loop_and_does_not_wind_up():
     """Near the goal m s^2 + F kp s + F ki = 0; from far below it runs at full throttle, and hardly overshoots."""
-    roots = np.roots([MASS, 6000 * 0.5, 6000 * 0.1])
+    roots = np.roots([CAR, 6000 * 0.5, 6000 * 0.1])
     m = driven(initial=1e-3)
     m.add(fb.Initial("way.displacement", rate=20.0))
     found = m.linearize().eigenvalues
@@ -139,8 +141,8 @@ def bicycle(path, start=(0.0, 0.0, 0.0), turn=0.0, **driver):
     nose = (x + BASE * c, y + BASE * s)
     m.add(fb.Body("fork", mass=0.1, inertia=0.01, position=nose, angle=heading))
     m.add(fb.Revolute("head", "frame", "fork", at=nose))
-    m.add(fb.KnifeEdge("rear", "ground", "frame", at=(x, y), direction=(c, s)))
-    m.add(fb.KnifeEdge("front", "ground", "fork", at=nose, direction=(c, s)))
+    m.add(fb.KnifeEdge("rear", "ground", "frame", at=(x, y), axis=(c, s)))
+    m.add(fb.KnifeEdge("front", "ground", "fork", at=nose, axis=(c, s)))
     m.add(fb.PathDriver("driver", "frame", path=path, wheelbase=BASE, **driver))
     m.add(fb.Motor("servo", "head", torque="0.01*(400**2*(driver - angle) - 2*400*rate)"))
     return m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from ..errors import ModelError
 from ..model.body import Frame
 from ..model.controller import Controller, ControlState, Sensor
 from ..model.element import Element, Length, Name, Number, Point, Unit, element, positive, python_data
+from ..model.expression_parser import SyntaxNode
 from ..model.table import Table
 
 if TYPE_CHECKING:
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
 FOLLOW = 10.0  # rate, by preview time, at which the place on the path follows the vehicle
 SPACING = 8  # points of the tables for each point of the path
 MOST_POINTS = 4000  # of a table
-POSITIONS = ("x", "y", "vx", "vy")
-WAY = ("x", "y", "along_x", "along_y")  # tables of the path: place and direction
+COLUMNS = ("x", "y", "along_x", "along_y")  # tables of the path: place and direction
+SENSORS = {"x": "rear.x", "y": "rear.y", "vx": "rear.vx", "vy": "rear.vy", "nose_x": "nose.x", "nose_y": "nose.y"}
 Places = Annotated[tuple[tuple[float, ...], ...], BeforeValidator(python_data)]
 
 
@@ -76,7 +78,7 @@ class PathDriver(Controller):
     Systems, Man, and Cybernetics 11, 1981.
     """
 
-    body: Name
+    body: Name = field(kw_only=False)
     path: Places
     wheelbase: Length
     understeer: Annotated[Number, Unit("rad*s^2/m")] = 0.0
@@ -102,30 +104,30 @@ class PathDriver(Controller):
             )
 
     def given(self) -> dict[str, Any]:
-        """Return motion of the vehicle, and the constants."""
+        """Return the constants."""
         own = ("wheelbase", "understeer", "preview", "least", "limit", "period")
-        out = {k: getattr(self, k) for k in own if getattr(self, k) is not None}
-        return out | {k: f"{self.name}_{k}" for k in (*POSITIONS, "nose_x", "nose_y")}
+        return {k: getattr(self, k) for k in own if getattr(self, k) is not None}
+
+    def derived(self, name: str, wiring: Any) -> SyntaxNode | None:
+        """Return a sensor of the vehicle, or place and direction of the path at ``place`` or ``ahead``."""
+        if name in SENSORS:
+            return SyntaxNode("name", (), f"{self.name}_{name}")
+        at, _, what = name.partition("_")
+        if what not in COLUMNS:
+            return None
+        return SyntaxNode("table", (wiring.template(self, at),), f"{self.name}_path_{what}")
 
     def signals(self) -> dict[str, str]:
-        """Return the angle, the deviation, the place, and what they follow from."""
-
-        def way(what: str, at: str) -> str:
-            return f"{self.name}_path_{what}({at})"
-
-        ahead = "place + sqrt(least**2 + preview**2*(vx**2 + vy**2))"
+        """Return the angle, the deviation, the place aimed at, and what they follow from."""
         angle = "atan(wheelbase*curvature) + understeer*(vx**2 + vy**2)*curvature"
-        gap_x, gap_y = f"({way('x', 'place')} - x)", f"({way('y', 'place')} - y)"
+        toward = "(ahead_x - x)", "(ahead_y - y)"
+        pull = f"{FOLLOW}/preview"
         return {
             "output": angle if self.limit is None else f"max(min({angle}, limit), -limit)",
-            "error": f"{way('along_y', 'place')}*{gap_x} - {way('along_x', 'place')}*{gap_y}",
-            "curvature": "2*((nose_x - x)*ahead_y - (nose_y - y)*ahead_x)/(ahead_x**2 + ahead_y**2)",
-            "ahead_x": f"{way('x', ahead)} - x",
-            "ahead_y": f"{way('y', ahead)} - y",
-            "progress": (
-                f"{way('along_x', 'place')}*(vx - {FOLLOW}/preview*{gap_x}) + "
-                f"{way('along_y', 'place')}*(vy - {FOLLOW}/preview*{gap_y})"
-            ),
+            "error": "place_along_x*(y - place_y) - place_along_y*(x - place_x)",
+            "ahead": "place + sqrt(least**2 + preview**2*(vx**2 + vy**2))",
+            "curvature": f"2*((nose_x - x)*{toward[1]} - (nose_y - y)*{toward[0]})/({toward[0]}**2 + {toward[1]}**2)",
+            "progress": (f"place_along_x*(vx + {pull}*(x - place_x)) + place_along_y*(vy + {pull}*(y - place_y))"),
         }
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
@@ -138,12 +140,11 @@ class PathDriver(Controller):
         first = rear[0] + 1.0 if isinstance(rear[0], float) else f"({rear[0]}) + (1 m)"
         frames = [Frame(f"{self.name}_rear", self.body, position=rear)]
         frames.append(Frame(f"{self.name}_nose", self.body, position=(first, *rear[1:])))
-        sensors = [Sensor(f"{self.name}_{k}", f"{frames[0].name}.{k}") for k in POSITIONS]
-        sensors += [Sensor(f"{self.name}_nose_{k}", f"{frames[1].name}.{k}") for k in "xy"]
+        sensors = [Sensor(f"{self.name}_{k}", f"{self.name}_{of}") for k, of in SENSORS.items()]
         s, columns = path_columns(np.array(self.path))
         tables = [
             Table(f"{self.name}_path_{k}", x=s, y=y, beyond="line" if k in "xy" else "hold")
-            for k, y in zip(WAY, columns, strict=True)
+            for k, y in zip(COLUMNS, columns, strict=True)
         ]
         return (*frames, *sensors, *tables)
 

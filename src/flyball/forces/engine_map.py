@@ -23,7 +23,7 @@ BAND = 0.05  # of idle speed or speed limit: range in which governor and limiter
 class EngineMap(JointForce):
     """An engine whose torque is a function of speed and throttle, given on a grid.
 
-    Between the points the torque is bicubic (`Table2D`), beyond them that of the edge. The row of the closed throttle
+    Between the points the torque is bicubic (`Table2D`), beyond them it continues with the slope of the edge. The row of the closed throttle
     is the drag of the engine: engine braking. An idle governor opens the throttle where the speed falls below ``idle``,
     fully at 5 % less; a limiter closes it at ``limit``, from 5 % below on. With the throttle p of the driver, that of
     the engine is (1 - (1 - p)(1 - p_idle)) p_limit.
@@ -108,7 +108,7 @@ class EngineMap(JointForce):
     def parts(self, model: Model) -> tuple[Element, ...]:
         """Return the map, the torque by it, and the inertia."""
         table = Table2D(
-            f"{self.name}_map", x=self.speeds, y=self.throttles, z=self.torques, x_unit=self.speed_unit, beyond="hold"
+            f"{self.name}_map", x=self.speeds, y=self.throttles, z=self.torques, x_unit=self.speed_unit, beyond="line"
         )
         torque = Motor(f"{self.name}_torque", self.joint, torque=f"{table.name}(rate, {self.position()})")
         if self.inertia == 0.0:

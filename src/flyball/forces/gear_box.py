@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from ..errors import ModelError
 from ..model.body import RATE
 from ..model.controller import Sensor
-from ..model.element import Element, Law, LawOf, Number, Numbers, Unit, element, positive
+from ..model.element import Element, Law, LawOf, Number, Numbers, Unit, element, positive, resolve
 from ..model.event import Event, Set
 from ..model.force import CoordinateForce
 from ..model.table import Table
@@ -118,20 +118,20 @@ class GearBox(CoordinateForce):
             state(gear, rate="0", initial=self.gear),
             state(target, rate="0", initial=self.gear),
             state(shifted, rate="0", initial=LONG_AGO),
-            *self._schedule(target, shifted),
+            *self._schedule(resolve(self, model.environment()).ratios, target, shifted),
             Event(f"{self.name}_engages", f"{since} - {opening}", do=(Set(f"{gear}.value", target),)),
             *(
                 Brake(
                     f"{self.name}_{k}",
                     (self.coordinate_i, self.coordinate_j),
                     weights=(1.0, f"-({ratio})"),
-                    capacity=f"where({gear} > {k - 0.5} and {gear} < {k + 0.5}, {capacity}, 0)",
+                    capacity=f"{capacity}*{engaged(gear, k, len(self.ratios))}",
                 )
                 for k, ratio in enumerate(self.ratios, 1)
             ),
         )
 
-    def _schedule(self, target: str, shifted: str) -> tuple[Element, ...]:
+    def _schedule(self, ratios: tuple[float, ...], target: str, shifted: str) -> tuple[Element, ...]:
         """Return the automatic shifts: a speed is passed, no shift is under way, and there is a next gear."""
         if self.up is None and self.down is None:
             return ()
@@ -139,7 +139,7 @@ class GearBox(CoordinateForce):
         ratio = Table(
             f"{self.name}_ratio",
             x=tuple(map(float, range(1, count + 1))),
-            y=self.ratios,
+            y=ratios,
             interpolation="linear",
             beyond="hold",
         )
@@ -154,3 +154,12 @@ class GearBox(CoordinateForce):
             do = (Set(f"{target}.value", f"{target} + {by}"), Set(f"{shifted}.value", "t"))
             shifts.append(Event(f"{self.name}_{name}", f"min({passed}, {over}, {left})", do=do))
         return (Sensor(speed, f"{self.coordinate_j}{RATE}"), ratio, *shifts)
+
+
+def engaged(gear: str, k: int, count: int) -> str:
+    """Return an expression that is 1 where the whole number ``gear`` is k, 0 where it is another one from 0 to count.
+
+    It is Lagrange's polynomial, which has no corners that a motion would have to watch.
+    """
+    factors = [f"({gear} - {j})/{k - j}" for j in range(count + 1) if j != k]
+    return f"({'*'.join(factors)})"
