@@ -398,7 +398,11 @@ class Subassembly:
         """Transform the points and directions in the world."""
         for name, unit in fields_with(type(e), Unit).items():
             value = self._value(e, new, name)
-            if name in (*e.local, *e.in_own_axes, *e.handed) or not isinstance(value, tuple) or unit.dimension not in ("m", ""):
+            if (
+                name in (*e.local, *e.in_own_axes, *e.handed)
+                or not isinstance(value, tuple)
+                or unit.dimension not in ("m", "")
+            ):
                 continue
             if unit.dimension == "m":
                 new[name] = self.place.points(value)
