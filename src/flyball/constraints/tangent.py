@@ -7,13 +7,11 @@ less the first,
 
     L = sqrt(r.r - b^2),  theta = atan2(y, x) - asin(b / rho),  rho^2 = x^2 + y^2,
 
-where r is the position of M's origin in F. The value is L - b theta: the rope on both circles, measured from fixed
-directions in F, changes by -b theta. Its gradient is the unit vector along the tangent. Outside the plane, where z is
+where r is the position of M's origin in F. The value is L - b theta: as the tangent swings by theta, the arcs on both
+circles change by -b theta. Its gradient is the unit vector along the tangent, for L dtheta = n.dr and dL = u.dr +
+b dtheta with the unit vectors u along the tangent and n to its left. Outside the plane, where z is
 not zero, L is the distance from the tangent point and theta that of the projection. ``data`` has b at par[1]; theta is
 counted over full turns from ``hint``.
-
-The formula is that of belts over two pulleys, for instance Shigley, *Mechanical Engineering Design* (1963), chapter
-16: open belts have radii of one sign, crossed belts of both.
 """
 
 from __future__ import annotations

@@ -38,6 +38,7 @@ from .motor import LITTLE
 from .rope_geometry import drawn_rope, is_backward, is_point, pulley_axes
 
 if TYPE_CHECKING:
+    from ..constraints.blocks import Row
     from ..model.model import Model
 
 KIND = 2
@@ -73,6 +74,11 @@ class LengthLimit(Limit):
     """The largest length of a path and of the rope on a drum, with the words of a rope."""
 
     in_files: ClassVar[bool] = False
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Return kind and name of the rope, for messages."""
+        return f"Rope {self.name.removesuffix('_limit')!r}"
 
     def switches(self) -> tuple[Switch, ...]:
         """Return one switch along the sum."""
@@ -127,15 +133,15 @@ class Rope(PathForce):
     A winch winds it up: with ``drum`` and ``radius`` its free length is ``length`` less radius times the drum's angle,
     and the tension turns the drum. With ``feed`` it is ``length`` plus that law.
 
-    With ``radii`` its points are the centres of pulleys, drums and fixed cylinders, which it touches along tangents; the
+    With ``radii`` its points are the centres of pulleys, drums and fixed cylinders; it touches them along tangents. The
     arcs are part of its length. It slides around a pulley without friction: the torque on the pulley's body is zero. An
     end with a radius is fixed to its body, a drum: the rope is wound on it as the body turns, over any number of turns,
     and the torque is tension times radius. A pulley that turns with the rope and has inertia is the end of two ropes.
 
-    A rope with winch, feed or radii consists of elements of
-    its own, which decide what an analysis makes of it: coordinates ``NAME_1``, ``NAME_2``, ... of its straight parts
-    (`LinearActuator`), a `Limit` ``NAME_limit`` of their sum with the rope on the drum, and for ``feed`` a slide
-    ``NAME_feed`` on ground with a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``.
+    A rope with winch, feed or radii consists of elements of its own, which decide what an analysis makes of it:
+    coordinates ``NAME_1``, ``NAME_2``, ... of its straight parts (`LinearActuator`, next to a pulley `RopeSpan`), a
+    `Limit` ``NAME_limit`` of their sum with the rope on the drum, and for ``feed`` a slide ``NAME_feed`` on ground with
+    a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``.
 
     Parameters
     ----------
@@ -173,10 +179,12 @@ class Rope(PathForce):
     -----
     A result contains the ``length`` of the path, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack;
     ``load_1``, ``load_2``, ...: the magnitude of the force on each point, such as the bearing of a pulley; with
-    ``radii`` also ``wrap_1``, ``wrap_2``, ...: the angle around each centre [rad]. The ``length`` of such a rope includes
-    its arcs and the rope on its drums, less the rope paid out by ``feed``. A wrap below zero means that the rope would
-    have left the pulley, which is not modelled: it then goes on as if the pulley pulled. Nor is displacement of the
-    straight parts along the axis more than counted in their length: the pulleys swivel by joints, if at all.
+    ``radii`` also ``wrap_1``, ``wrap_2``, ...: the angle around each centre [rad]. The ``length`` of such a rope
+    includes its arcs and the rope on its drums, less the rope paid out by ``feed``.
+
+    A wrap below zero means that the rope has left the pulley, which is not modelled: the motion goes on as if the
+    pulley could pull. In space a straight part may leave the plane of its pulley, as a load swings; a pulley
+    swivels with its body only.
     """
 
     stiffness: Stiffness | None = None
@@ -198,6 +206,7 @@ class Rope(PathForce):
     shows_parts: ClassVar[bool] = False
     reversing: ClassVar[dict[str, str]] = {"drum": "radius"}
     axial: ClassVar[bool] = True
+    handed: ClassVar[tuple[str, ...]] = ("radii",)
 
     def derive(self, n: SimpleNamespace, env: Any) -> None:
         """Complete the turns."""
@@ -223,7 +232,9 @@ class Rope(PathForce):
         """Require centres, a radius and turns for each, and a common tangent of all neighbours."""
         count = len(self.bodies)
         if self.drum is not None:
-            raise ModelError(f"{self.title}: radii and drum are both given; a drum is an end with a radius, on its body")
+            raise ModelError(
+                f"{self.title}: radii and drum are both given; a drum is an end with a radius, on its body"
+            )
         if n.at is None:
             raise ModelError(f"{self.title}: give the centres of its pulleys: at=")
         if len(n.radii) != count or len(n.turns) != count:
@@ -237,8 +248,8 @@ class Rope(PathForce):
                 raise ModelError(f"{self.title}: radius {k + 1}, {given!r}, is 0; write the number 0 for a point")
             if turns < 0.0 or (inner and turns != int(turns)) or (turns and is_point(given)):
                 raise ModelError(
-                    f"{self.title}: turns {k + 1} is {turns:g}; it is 0 at a point, a whole number at a pulley, and not "
-                    "negative"
+                    f"{self.title}: turns {k + 1} is {turns:g}; it is 0 at a point, a whole number at a pulley, "
+                    "and not negative"
                 )
         drawn_rope(self, n)
 

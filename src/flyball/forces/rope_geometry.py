@@ -93,8 +93,8 @@ def drawn_rope(e: Any, n: SimpleNamespace) -> DrawnRope:
         size = math.sqrt(float((d.real**2).sum()))
         if abs(d[2].real) > COPLANAR * size and (n.radii[k] or n.radii[k + 1]):
             raise ModelError(
-                f"{e.title}: points {k + 1} and {k + 2} are {abs(d[2].real):.6g} m apart along the axis of its pulleys; "
-                "all pulleys and the points next to them are in one plane. Move one, or divide the rope"
+                f"{e.title}: points {k + 1} and {k + 2} are {abs(d[2].real):.6g} m apart along the axis of its "
+                "pulleys; all pulleys and the points next to them are in one plane. Move one, or divide the rope"
             )
         if not size > abs(b.real):
             raise ModelError(
@@ -108,7 +108,8 @@ def drawn_rope(e: Any, n: SimpleNamespace) -> DrawnRope:
         turned = (after - before) * sign(r)
         whole = math.floor((turned.real + LIFTED) / TURN)
         wraps.append((turned + TURN * (turns - whole)) if r else 0.0 * turned)
-    return DrawnRope(*zip(*found, strict=True), (*wraps, TURN * n.turns[-1]))
+    lengths, directions, places = zip(*found, strict=True)
+    return DrawnRope(lengths, directions, places, (*wraps, TURN * n.turns[-1]))
 
 
 class RopeCourse(NamedTuple):

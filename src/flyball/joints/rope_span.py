@@ -40,7 +40,7 @@ class RopeSpan(Joint):
 
     coordinates: ClassVar = {"length": Coordinate(TANGENT), "angle": Coordinate(ANGLE)}
     needs_axis: ClassVar[bool] = True
-    in_own_axes: ClassVar[tuple[str, ...]] = ("radii",)
+    handed: ClassVar[tuple[str, ...]] = ("radii",)
     axial: ClassVar[bool] = True
     place_unit: ClassVar[str] = "rad"
     symbol: ClassVar[str] = "rope"

@@ -298,6 +298,7 @@ class Element(metaclass=ElementType):
     modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
     in_own_axes: ClassVar[tuple[str, ...]] = ()  # points that its other fields place, and that copies keep
     local: ClassVar[tuple[str, ...]] = ()  # vectors and orientations along its own or its body's axes, not the world's
+    handed: ClassVar[tuple[str, ...]] = ()  # numbers whose signs are senses of rotation in the plane
     mirrors: ClassVar[bool] = False  # of an own element: whether its formulas hold for it turned or reflected as well
 
     def __init_subclass__(cls, **kwargs: Any) -> None:

@@ -401,12 +401,19 @@ class Subassembly:
         """Transform the points and directions in the world."""
         for name, unit in fields_with(type(e), Unit).items():
             value = self._value(e, new, name)
-            if name in (*e.local, *e.in_own_axes) or not isinstance(value, tuple) or unit.dimension not in ("m", ""):
+            if (
+                name in (*e.local, *e.in_own_axes, *e.handed)
+                or not isinstance(value, tuple)
+                or unit.dimension not in ("m", "")
+            ):
                 continue
             if unit.dimension == "m":
                 new[name] = self.place.points(value)
             else:
                 new[name] = self.place.directions(value, axial=name in ("axis", "axes") and getattr(e, "axial", False))
+        for name in e.handed if self.planar and self.place.mirror else ():
+            if (given := self._value(e, new, name)) is not None:
+                new[name] = tuple(scaled(-1.0, x) for x in given)
         own = not type(e).__module__.startswith("flyball.")
         if own and (self.place.mirror or self.place.turned) and not type(e).mirrors:
             self.refuse(e, f"{type(e).__name__} does not declare that its formulas allow it: mirrors = True")

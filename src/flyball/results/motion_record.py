@@ -250,9 +250,7 @@ def measured_coordinate(
     counts = c.row.of_kind.turns and turns is not None
     hint = turns if counts or c.row.of_kind.place else 0.0
     with np.errstate(all="ignore"):  # at a singular position
-        value, f, tM, tF, second = c.row.of_kind.row(
-            (1.0, *par[1:]) if counts else par, F, M, hint, data
-        )
+        value, f, tM, tF, second = c.row.of_kind.row((1.0, *par[1:]) if counts else par, F, M, hint, data)
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
     if c.row.of_kind.turns and not counts:
         value = value + np.unwrap(np.real(value)) - np.real(value)

@@ -424,6 +424,8 @@ def _tree_and_loops(model: Model) -> tuple[list[str], list[str]]:
 
 def attributes_of(e: Element, n: Any, separation: float) -> dict[str, Any] | str:
     """Attributes of a joint or tendon that an element becomes, ``rest`` being the range without force; or why none."""
+    if isinstance(e, Rope) and e.radii is not None:
+        return "it runs over pulleys with a radius"
     if isinstance(e, Limit | Rope):
         bounds = (0.0, separation if n.length is None else n.length) if isinstance(e, Rope) else (n.lower, n.upper)
         lower, upper = (b if x is None else float(x) for x, b in zip(bounds, (-UNLIMITED, UNLIMITED), strict=True))

@@ -74,6 +74,8 @@ def _law_fields(e) -> dict[str, LawOf]:
 def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
     """Measured quantity that a force acts along."""
     if other := e.measured_with():
+        for role in e.ends():  # for results
+            frame_index(s, e, role)
         return _acting_quantity(s, s.model[other])  # type: ignore[arg-type]
     text = e.coordinate_text() or f"{e.name}:length"
     if text in s.measured:

@@ -1,0 +1,255 @@
+"""Ropes over pulleys and drums with a radius, against closed forms."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.errors import ModelError
+from flyball.model.model_files import dumps, loads
+from tests.layers import both_layers
+
+G = 9.81
+R = 0.1
+
+
+def atwood(*, inertia=None, planar=True, **rope):
+    """Masses of 2 and 3 kg, 4 m below a pulley without friction, or below a wheel with inertia."""
+
+    def p(x, y):
+        return (x, y) if planar else (x, y, 0.0)
+
+    about, axis = (0.1, {}) if planar else ((0.1,) * 3, {"axis": (0, 0, 1)})
+    m = fb.Mechanism("atwood", planar=planar, gravity=p(0, -G), parameters={"r": R})
+    for name, mass, x in (("a", 2, -R), ("b", 3, R)):
+        m.add(fb.Body(name, mass=mass, inertia=about, position=p(x, -4)))
+        m.add(fb.Prismatic(f"{name}_guide", "ground", name, at=p(x, -4), axis=p(0, 1)))
+    ends = p(-R, -4), p(0, 0), p(R, -4)
+    if inertia is None:
+        m.add(fb.Rope("rope", ("a", "ground", "b"), at=ends, radii=(0, "-r", 0), **axis, **rope))
+        return m
+    m.add(fb.Body("wheel", mass=1, inertia=inertia if planar else (inertia,) * 3))
+    m.add(fb.Revolute("axle", "ground", "wheel", at=p(0, 0), **axis))
+    m.add(fb.Rope("left", ("a", "wheel"), at=ends[:2], radii=(0, "-r"), turns=(0, 6), **axis, **rope))
+    m.add(fb.Rope("right", ("wheel", "b"), at=ends[1:], radii=("-r", 0), turns=(6, 0), **axis, **rope))
+    return m
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_atwood_machine(planar):
+    r = atwood(planar=planar).simulate(0.5)
+    assert r["a_guide.displacement"] == pytest.approx(0.5 * G / 5 * r.t**2, abs=1e-9)
+    assert r["rope.tension"] == pytest.approx(2 * 2 * 3 / 5 * G, rel=1e-9)
+    assert r["rope.length"] == pytest.approx(8.0 + np.pi * R, rel=1e-12)
+    assert r["rope.wrap_2"] == pytest.approx(np.pi, rel=1e-9)
+    assert r["rope.load_2"] == pytest.approx(2 * r["rope.tension"], rel=1e-9)
+    assert np.abs(r["energy.balance"]).max() < 1e-9
+
+
+@both_layers
+def test_wheel_with_inertia_over_several_turns():
+    """The rope sticks to the wheel: (m_a + m_b + J / r^2) a = (m_b - m_a) g, over more than three turns."""
+    J = 0.02
+    r = atwood(inertia=J).simulate(2.2)
+    a = G / (5 + J / R**2)
+    assert r["b_guide.displacement"] == pytest.approx(-0.5 * a * r.t**2, abs=1e-7)
+    assert r["axle.angle"][-1] == pytest.approx(-0.5 * a * r.t[-1] ** 2 / R, rel=1e-7)
+    assert abs(r["axle.angle"][-1]) > 6 * np.pi
+    assert r["left.tension"] == pytest.approx(2 * (G + a), rel=1e-7)
+    assert r["right.tension"] == pytest.approx(3 * (G - a), rel=1e-7)
+    assert r["left.wrap_2"] == pytest.approx(12 * np.pi - r["axle.angle"], rel=1e-9)
+    assert r["right.wrap_1"] == pytest.approx(12 * np.pi + r["axle.angle"], rel=1e-9)
+    assert r["left.length"] == pytest.approx(4.0 + 12 * np.pi * R, rel=1e-9)
+
+
+@both_layers
+def test_block_and_tackle():
+    """A load on two parts of a rope: it moves half as far as the rope, with twice its tension."""
+    m = fb.Mechanism("tackle", planar=True, gravity=(0, -G))
+    m.add(
+        fb.Body("block", mass=20, inertia=1, position=(0, -2)), fb.Body("weight", mass=12, inertia=1, position=(3, -2))
+    )
+    m.add(fb.Prismatic("B", "ground", "block", at=(0, -2), axis=(0, 1)))
+    m.add(fb.Prismatic("W", "ground", "weight", at=(3, -2), axis=(0, 1)))
+    at = ((-0.2, 0), (0, -2), (1.6, 0), (3, -2))
+    m.add(fb.Rope("rope", ("ground", "block", "ground", "weight"), at=at, radii=(0, 0.2, -1.4, 0)))
+    r = m.simulate(0.3)
+    a = (20 - 2 * 12) * G / (20 + 4 * 12)  # of the block, downwards
+    assert r["B.displacement"] == pytest.approx(-0.5 * a * r.t**2, abs=1e-9)
+    assert r["W.displacement"] == pytest.approx(a * r.t**2, abs=1e-9)
+    assert r["rope.tension"] == pytest.approx(20 * (G - a) / 2, rel=1e-9)
+    assert r["rope.load_2"] == pytest.approx(2 * r["rope.tension"], rel=1e-9)
+    assert r["rope.length"] == pytest.approx(6.0 + np.pi * 1.6, rel=1e-12)
+
+
+@both_layers
+@pytest.mark.parametrize("side", [1, -1])
+def test_rope_that_unwinds_from_a_fixed_cylinder(side):
+    """Its end runs along the involute at constant speed v: l^2 = l_0^2 + 2 r v t, over two turns and more."""
+    v, start = 3.0, 0.2
+    m = fb.Mechanism("involute", planar=True, gravity=(0, 0))
+    m.add(fb.Body("mass", mass=2, inertia=0.1, position=(start, side * -R), velocity=(0, -side * v)))
+    rope = fb.Rope("rope", ("ground", "mass"), at=((0, 0), (start, side * -R)), radii=(side * R, 0), turns=(4, 0))
+    m.add(rope)
+    r = m.simulate(2.5)
+    length = np.sqrt(start**2 + 2 * R * v * r.t)
+    turned = (length - start) / R
+    assert turned[-1] > 3 * np.pi
+    assert r["rope.wrap_1"] == pytest.approx(8 * np.pi - turned, abs=1e-6)
+    assert np.hypot(r["mass.vx"], r["mass.vy"]) == pytest.approx(v, rel=1e-9)
+    assert r["rope.tension"] == pytest.approx(2 * v**2 / length, rel=1e-6)
+    assert np.hypot(r["mass.x"], r["mass.y"]) == pytest.approx(np.hypot(length, R), rel=1e-7)
+    assert r["rope.length"] == pytest.approx(start + 8 * np.pi * R, rel=1e-9)
+
+
+@pytest.mark.parametrize("second", [0.5, -0.5])
+def test_lengths_of_open_and_crossed_belts(second):
+    """From a drum around a pulley and back: two tangents sqrt(d^2 - (r_2 - r_1)^2), wrap pi + 2 asin((r_2 - r_1) / d)."""
+    d, first = 2.0, -0.3
+    m = fb.Mechanism("belt", planar=True)
+    m.add(fb.Body("pulley", mass=1, inertia=1, position=(d, 0)), fb.Fixed("F", "ground", "pulley", at=(d, 0)))
+    m.add(fb.Body("drum", mass=1, inertia=1), fb.Revolute("J", "ground", "drum", at=(0, 0)))
+    m.add(fb.Rope("belt", ("drum", "pulley", "drum"), at=((0, 0), (d, 0), (0, 0)), radii=(first, second, first)))
+    r = m.simulate(0.1)
+    more = abs(second) - abs(first) if first * second > 0 else abs(second) + abs(first)
+    wrap = np.pi + 2 * np.arcsin(more / d)
+    assert r["belt.wrap_2"] == pytest.approx(wrap, rel=1e-12)
+    assert r["belt.length"] == pytest.approx(2 * np.sqrt(d**2 - more**2) + abs(second) * wrap, rel=1e-12)
+
+
+def drum(planar=True, axis=None, Q=np.eye(3), **rope):
+    """A load on a rope that is wound three turns on a drum, which a motor turns; in space turned by Q."""
+
+    def p(x, y):
+        return (x, y) if planar else tuple((Q @ (x, y, 0.0)).tolist())
+
+    about, more = (0.1, {}) if planar else ((0.1,) * 3, {"axis": tuple(Q[:, 2].tolist())})
+    m = fb.Mechanism("hoist", planar=planar, gravity=p(0, -G), parameters={"r": R, "k": 5e3})
+    m.add(fb.Body("load", mass=10, inertia=about, position=p(1 + 0.2, -2)))
+    m.add(fb.Prismatic("hoist", "ground", "load", at=p(1.2, -2), axis=p(0, 1)))
+    m.add(fb.Body("drum", mass=5, inertia=0.2 if planar else (0.2,) * 3))
+    m.add(fb.Revolute("J", "ground", "drum", at=p(0, 0), **more))
+    at = (p(0, 0), p(1, 0.5), p(1.2, -2))
+    m.add(fb.Rope("rope", ("drum", "ground", "load"), at=at, radii=("-r", -0.2, 0), turns=(3, 0, 0), **more, **rope))
+    return m
+
+
+TURNED = np.array([[2, -2, 1], [1, 2, 2], [-2, -1, 2]]) / 3.0
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_hoist_with_a_drum(planar):
+    torque = 12.0
+    m = drum(planar, Q=TURNED)
+    m.add(fb.Motor("M", "J", torque=torque))
+    r = m.simulate(1.5)
+    a = (torque / R - 10 * G) / (10 + 0.2 / R**2)
+    assert r["hoist.displacement"] == pytest.approx(0.5 * a * r.t**2, abs=1e-8)
+    assert r["rope.tension"] == pytest.approx(10 * (G + a), rel=1e-8)
+    assert r["rope.wrap_1"] == pytest.approx(6 * np.pi + r["J.angle"], rel=1e-10)
+    d, more = np.hypot(1.0, 0.5), 0.1
+    fall = np.arctan2(0.5, 1.0) + np.arcsin(more / d) + np.pi / 2
+    assert r["rope.wrap_2"] == pytest.approx(fall, rel=1e-10)
+    assert r["rope.load_2"] == pytest.approx(2 * np.sin(fall / 2) * r["rope.tension"], rel=1e-10)
+    assert r["rope.length"][0] == pytest.approx(np.sqrt(d**2 - more**2) + 2.5 + 0.2 * fall + 0.6 * np.pi, rel=1e-12)
+
+
+def test_elastic_rope_swings_and_goes_slack():
+    """On a drum that is held: m g / k and sqrt(k / m). Thrown up the load flies free, with the rope slack."""
+    m = drum(stiffness="k")
+    m.add(fb.Driver("D", "J.angle", "0"))
+    r = m.simulate(1.0)
+    w = np.sqrt(5e3 / 10)
+    assert r["hoist.displacement"] == pytest.approx(-10 * G / 5e3 * (1 - np.cos(w * r.t)), abs=1e-6)
+    assert m.modes(about=m.equilibrium()).omega[0] == pytest.approx(w, rel=1e-6)
+    thrown = drum()
+    thrown.add(fb.Driver("D", "J.angle", "0"), fb.Initial("hoist.displacement", rate=1.0))
+    r = thrown.simulate(0.3)
+    back = 2.0 / G
+    free = r.t < back
+    assert r["hoist.displacement"][free] == pytest.approx((r.t - 0.5 * G * r.t**2)[free], abs=1e-9)
+    assert r["rope.taut"][free].max() == 0.0
+    assert r["rope.taut"][-1] == 1.0
+    assert [e.t for e in r.events if e.kind == "goes taut" or "taut" in str(e)] == pytest.approx([back], abs=1e-8)
+
+
+def test_capstan():
+    """Euler and Eytelwein: a rope slides around a post where one tension is exp(mu phi) times the other.
+
+    The post carries a ring without mass of its own that turns with the rope, braked by the smaller tension times that
+    ratio less one.
+    """
+    mu, k = 0.3, 2e4
+    ratio = float(np.exp(mu * np.pi))
+    m = fb.Mechanism("capstan", planar=True, gravity=(0, -G), parameters={"heavy": 6.0})
+    for name, mass, x in (("a", 2, -R), ("b", "heavy", R)):
+        m.add(fb.Body(name, mass=mass, inertia=0.1, position=(x, -1)))
+        m.add(fb.Prismatic(f"{name}_guide", "ground", name, at=(x, -1), axis=(0, 1)))
+    m.add(fb.Body("ring", mass=0.1, inertia=1e-5), fb.Revolute("post", "ground", "ring", at=(0, 0)))
+    m.add(fb.Rope("left", ("a", "ring"), at=((-R, -1), (0, 0)), radii=(0, -R), turns=(0, 3), stiffness=k, damping=200))
+    m.add(fb.Rope("right", ("ring", "b"), at=((0, 0), (R, -1)), radii=(-R, 0), turns=(3, 0), stiffness=k, damping=200))
+    free = 1.0 + 6 * np.pi * R
+    m.add(fb.Sensor("one", "left.length"), fb.Sensor("two", "right.length"))
+    smaller = f"max(0, min(one, two) - {free!r})*{k}"
+    m.add(fb.Brake("friction", "post.angle", capacity=f"{R}*{ratio - 1.0!r}*{smaller}"))
+    r = m.simulate(0.4, parameters={"heavy": 0.95 * 2 * ratio})
+    assert abs(r["post.angle_rate"][-1]) < 1e-6
+    assert r["right.tension"][-1] / r["left.tension"][-1] == pytest.approx(0.95 * ratio, rel=1e-3)
+    r = m.simulate(0.4, parameters={"heavy": 1.3 * 2 * ratio})
+    assert r["right.tension"][-1] / r["left.tension"][-1] == pytest.approx(ratio, rel=1e-3)
+    heavy = 1.3 * 2 * ratio
+    a = G * (heavy - 2 * ratio) / (heavy + 2 * ratio)
+    assert r["b_guide.displacement_rate"][-1] - r["b_guide.displacement_rate"][len(r.t) // 2] == pytest.approx(
+        -a * (r.t[-1] - r.t[len(r.t) // 2]), rel=2e-2
+    )
+
+
+def test_files_and_reflections():
+    m = drum(length="5 m")
+    assert loads(dumps(m), fb.Mechanism, "hoist.toml") == m
+    assert "rope_limit" not in dumps(m)
+    m = drum()
+    m.add(fb.Motor("M", "J", torque=12.0))
+    whole = fb.Mechanism("pair", planar=True, gravity=(0, -G))
+    whole.add(m, prefix="one")
+    whole.add(m, prefix="two", mirror="x", at=(4, 0))
+    r = whole.simulate(0.5)
+    assert r["two.rope.tension"] == pytest.approx(drum_tension(12.0), rel=1e-8)
+    assert r["one.rope.tension"] == pytest.approx(drum_tension(12.0), rel=1e-8)
+
+
+def drum_tension(torque):
+    """Tension of the rope of `drum`."""
+    return 10 * (G + (torque / R - 10 * G) / (10 + 0.2 / R**2))
+
+
+@pytest.mark.parametrize(
+    ("fields", "why"),
+    [
+        ({"radii": (0, -0.2)}, "3 bodies need as many radii and turns"),
+        ({"turns": (3, 0)}, "3 bodies need as many radii and turns"),
+        ({"turns": (3, 0.5, 0)}, "turns 2 is 0.5; it is 0 at a point, a whole number at a pulley"),
+        ({"turns": (3, 0, 1)}, "turns 3 is 1; it is 0 at a point"),
+        ({"radii": ("-r", "r - r", 0)}, "radius 2, 'r - r', is 0"),
+        ({"radii": (-0.6, 0.6, 0), "turns": None}, "points 1 and 2 are 1.11803 m apart, .* no line touches both"),
+        ({"drum": "J.angle", "radius": 0.1}, "a drum is an end with a radius"),
+        ({"at": None}, "give the centres of its pulleys"),
+        ({"axis": (0, 0, 1)}, "leave axis out"),
+        ({"radii": None}, "turns and axis are those of pulleys"),
+    ],
+)
+def test_refused_pulleys(fields, why):
+    m = fb.Mechanism("m", planar=True, parameters={"r": R})
+    m.add(fb.Body("load", mass=1, inertia=1, position=(1.2, -2)), fb.Body("drum", mass=5, inertia=0.2))
+    m.add(fb.Revolute("J", "ground", "drum", at=(0, 0)))
+    own = {"at": ((0, 0), (1, 0.5), (1.2, -2)), "radii": ("-r", -0.2, 0), "turns": (3, 0, 0)} | fields
+    with pytest.raises(ModelError, match=why):
+        m.add(fb.Rope("rope", ("drum", "ground", "load"), **own))
+
+
+def test_refused_in_space():
+    m = fb.Mechanism("m", planar=False)
+    m.add(fb.Body("load", mass=1, inertia=(1, 1, 1), position=(1, 0, -2)))
+    with pytest.raises(ModelError, match="give the axis of its pulleys"):
+        m.add(fb.Rope("rope", ("ground", "load"), at=((0, 0, 0), (1, 0, -2)), radii=(0.1, 0)))
+    with pytest.raises(ModelError, match="points 1 and 2 are 0.5 m apart along the axis"):
+        m.add(fb.Rope("rope", ("ground", "load"), at=((0, 0.5, 0), (1, 0, -2)), radii=(0.1, 0), axis=(0, 1, 0)))
