@@ -213,7 +213,7 @@ def track(
     friction : number [1]
         Between shoes and wheels.
     damping : number [N m s/rad]
-        Of the hinges, where not zero: by ``pin_1_damper``, ..., in the plane also ``pin_0_damper``; calms the free runs.
+        Of the hinges, where not zero: by ``pin_1_damper``, ..., in the plane also ``pin_0_damper``. It calms runs.
     spatial : bool
         Whether the mechanism is spatial.
     wheel_width : number [m]

@@ -137,6 +137,12 @@ def add_spring(A, h, n, which, stiffness, damping):
     share = y / (1.0 + y)
     x.stiffness[n], x.damping[n], x.implicit_share[n] = stiffness, damping, share
     x.added_mass[n] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
+    d = 0
+    while J[d] == 0.0:
+        d += 1
+    for g in range(A.queue.shape[0]):
+        if A.group[g] <= d < A.group[g + 1]:
+            x.first[n], x.end[n] = A.group[g], A.group[g + 1]
     return True
 
 
@@ -164,6 +170,28 @@ def with_spring_response(A, x):
     for i in range(n):
         for d in range(x.shape[0]):
             x[d] -= t.solution[i] * A.spring_Y[i, d]
+
+
+@formula
+def columns_with_spring_response(A):
+    """Do the same for all columns of ``A.response``."""
+    n, C, t, x = A.count.springs, A.stiff, A.spring_response, A.response
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(n):
+        s, J = zero, A.spring_J[i]
+        for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
+            s = add_columns(s, J[d], load_columns(x, d))
+        for k in range(i):
+            s = add_columns(s, -C[i, k], load_columns(t, k))
+        store_columns(t, i, add_columns(zero, 1.0 / C[i, i], s))
+    for i in range(n - 1, -1, -1):
+        s, Y = load_columns(t, i), A.spring_Y[i]
+        for k in range(i + 1, n):
+            s = add_columns(s, -C[k, i], load_columns(t, k))
+        s = add_columns(zero, 1.0 / C[i, i], s)
+        store_columns(t, i, s)
+        for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
+            store_columns(x, d, add_columns(load_columns(x, d), -Y[d], s))
 
 
 @formula
@@ -588,14 +616,8 @@ def row_responses(A, P):
     while columns > 0:
         if schur:
             solve_columns(A)
+        columns_with_spring_response(A)
         for c in range(columns):
-            if not schur:
-                fill_impulses(A, P, c)
-                impulse_response(A, A.velocities.impulse, A.velocities.impulsive)
-            else:
-                for d in range(A.response.shape[0]):
-                    A.velocities.impulsive[d] = A.response[d, c]
-            with_spring_response(A, A.velocities.impulsive)
             read_responses(A, P, c)
         columns = queue_columns(A, P)
 
@@ -608,7 +630,7 @@ def is_solved_by_schur(A):
 
 @formula
 def queue_columns(A, P):
-    """Take the next rows of all groups, and fill the columns with their responses without joints, M^-1 J^T.
+    """Take the next rows of all groups, and fill the columns with their responses, of `solve_columns` without joints.
 
     Returns the number of columns.
     """
@@ -623,9 +645,12 @@ def queue_columns(A, P):
         fill_impulses(A, P, columns)
         if is_solved_by_schur(A):
             for b in range(A.S.tree.parent.shape[0]):
-                apply_inverse_mass(A.S, b, A.velocities.impulse, A.S.tree.v[b], A.velocities.impulsive, A.S.tree.v[b])
-            for d in range(A.response.shape[0]):
-                A.response[d, columns] = A.velocities.impulsive[d]
+                d = A.S.tree.v[b]
+                apply_inverse_mass(A.S, b, A.velocities.impulse, d, A.velocities.impulsive, d)
+        else:
+            impulse_response(A, A.velocities.impulse, A.velocities.impulsive)
+        for d in range(A.response.shape[0]):
+            A.response[d, columns] = A.velocities.impulsive[d]
         columns += 1
     for c in range(columns, COLUMNS):
         for d in range(A.response.shape[0]):
@@ -688,4 +713,4 @@ def read_responses(A, P, c):
         at, a = A.column[g, c], A.group[g]
         if at >= 0:
             for d in range(A.group[g + 1] - a):
-                P.Y[at + d] = A.velocities.impulsive[a + d]
+                P.Y[at + d] = A.response[a + d, c]

@@ -1,7 +1,7 @@
 """The compiled step loop: contact search, impacts, velocities, displacements without overlap.
 
 Joints are closed at the end of a step by the smallest displacement in the metric of the masses. This moves light links
-and their contacts. Displacements are then computed again with the resulting gaps, until none is negative.
+and their contacts. Displacements are then computed again with the resulting gaps, as long as that halves the overlap.
 """
 
 from __future__ import annotations
@@ -121,7 +121,8 @@ def solver_counts(F: StepSolvers) -> np.ndarray:
 
 
 LIFT_PASSES = 16
-OVERLAP_FACTOR = 1e3  # overlap that a pass may leave, relative to the negligible one
+USEFUL_PASS = 0.5  # a pass that leaves a greater part of the overlap is the last one
+OVERLAP_FACTOR = 1e3  # overlap that a pass may leave, relative to the negligible one; at least that of its tolerance
 
 
 @formula
@@ -145,24 +146,25 @@ def change_of_gap(G, A, M, C, P, c):
 
 
 @formula
-def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, state):
-    """Return whether contacts overlap now; then set the gaps in ``Q`` to ``aim`` plus the change by the projection.
+def overlap_after_joints(G, A, M, C, P, Q, Y, aim, state):
+    """Return the largest overlap of contacts now if it counts, or 0.
 
-    ``aim`` has in column 0 the velocity that leaves no gap, with which ``Y`` was computed.
+    Then the gaps in ``Q`` are set to ``aim`` plus the change by the projection. ``aim`` has in column 0 the velocity
+    that leaves no gap, with which ``Y`` was computed.
     """
     if not A.real.kinetic >= 0.0:
-        return False
+        return 0.0
     h, worst = state.times.step, 0.0
     for c in range(C.count.found):
         change = change_of_gap(G, A, M, C, P, c)
         if change != 0.0:
             worst = min(worst, h * (aim[c, 0] + contact_velocity(P, Y.v, Y.wide, c)[0]) + change)
-    if worst >= -OVERLAP_FACTOR * state.tolerances.overlap:
-        return False
+    if worst >= -max(OVERLAP_FACTOR * state.tolerances.overlap, h * state.tolerances.position):
+        return 0.0
     for c in range(C.count.found):
         Q.bias[c, 0] = aim[c, 0] + change_of_gap(G, A, M, C, P, c) / h
     Q.size[0] = C.count.found
-    return True
+    return -worst
 
 
 @formula
@@ -305,13 +307,16 @@ def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, now):
     """End the mechanism's step on its joints, and repeat displacements where that made contacts overlap. Returns a
     status.
     """
+    last = 1e300
     for n in range(LIFT_PASSES + 1):
         if call_mechanism(A, M, C, P, Y, state, TASK_FINISH) != DONE:
             return NO_SOLUTION
         if state.addresses.mechanism == 0 or state.options.compliant != 0 or n == LIFT_PASSES:
             break
-        if not overlaps_after_joints(G, A, M, C, P, Q, Y, R.bias, state):
+        overlap = overlap_after_joints(G, A, M, C, P, Q, Y, R.bias, state)
+        if not 0.0 < overlap < USEFUL_PASS * last:
             break
+        last = overlap
         clear_velocities(Y)
         preload_displacements(C, P, X, Y, now)
         solve_cone_problem(

@@ -267,6 +267,8 @@ class Springs(Record, kind="Float", rows=True):
     direction: Column
     length: Column  # along the direction
     bias: Column  # acceleration
+    first: Column  # velocities of its group: the first one
+    end: Column  # and the one after the last
 
 
 class SingleRows(Record, kind="Int", rows=True):
@@ -338,6 +340,7 @@ class MechanismTables(NamedTuple):
     column: Int2  # (ng, COLUMNS): start of the row of each group whose response is in a column of ``response``, or -1
     response: Float2  # (nv, COLUMNS): responses that are computed together
     response_impulse: Float2  # (nr, COLUMNS): impulses of the joints in them
+    spring_response: Float2  # (springs, COLUMNS): impulses of the springs in them
     pose: Float2  # (movers, 12): before the projection onto the joints
 
 
