@@ -165,7 +165,7 @@ def test_a_sliding_body_is_braked_along_the_nearest_edge(directions, angle):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"directions": 4}, r"directions of Stepping is for solver='pyramid', not 'auto'"),
+        ({"directions": 4}, r"directions of Stepping is for solver='pyramid' and solver='lcp', not 'auto'"),
         ({"solver": "pyramid", "directions": 2}, "directions .* 3"),
         ({"solver": "pyramid", "coulomb": False}, "Coulomb's law on a pyramid"),
     ],

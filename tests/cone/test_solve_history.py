@@ -38,7 +38,7 @@ def options(solver: str, **more) -> fb.Stepping:
     return fb.Stepping(step="5 ms", solver=solver, coulomb=solver != "barzilai-borwein", **more)
 
 
-@pytest.mark.parametrize("solver", solver_names())
+@pytest.mark.parametrize("solver", [n for n in solver_names() if n != "lcp"])  # refused, see test_lcp
 def test_the_residuals_are_those_of_the_motion(solver):
     m = pile()
     plain = m.simulate(0.3, outputs=3, method=options(solver))

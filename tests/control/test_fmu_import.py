@@ -222,6 +222,15 @@ def test_faults_during_a_motion(unit, tmp_path, monkeypatch):
     assert log.read_text().count("+") == log.read_text().count("-")
 
 
+def test_a_unit_that_does_not_start(libraries, tmp_path):
+    text = description(2).replace('guid="{unit}"', 'guid="{other}"')
+    m = slide(fb.FMU("c", pack(tmp_path / "unit.fmu", 2, libraries[2], text), period=0.1), force="c.slow")
+    with pytest.raises(
+        (fb.SimulationError, fb.ModelError), match=r"FMU 'c'.*it cannot be loaded: Failed to instantiate"
+    ):
+        m.simulate(0.3)
+
+
 def test_what_cannot_have_a_unit_names_it(unit):
     m = slide(fb.FMU("c", unit, inputs={"u": "A.rate + 0"}, period=0.1), force="c.slow", G=1.0)
     for analysis in (

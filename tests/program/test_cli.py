@@ -135,11 +135,12 @@ friction = 0.3
 def test_every_contact_solver_can_be_asked_for(here: Path, solver: str) -> None:
     (here / "box.toml").write_text(f'name = "box"{CONTACT}')
     convex = ["--no-coulomb"] if solver == "barzilai-borwein" else []
-    words = ["--method", "impulse", "--step", "5 ms", "--solver", solver, *convex, "--history", "0.05,0.1"]
+    words = ["--method", "impulse", "--step", "5 ms", "--solver", solver, *convex]
+    words += ["--history", "0.05,0.1"] if solver != "lcp" else []  # it does not iterate
     said = Said("run", "box.toml", "--t-end", "0.1", "--no-animation", "--no-plots", "--json", *words)
     assert said.code == 0, said.err
     assert json.loads(said.out)["health"]["options"]["method"]["solver"] == solver
-    assert (here / "box-result" / "residuals.png").stat().st_size > 1000
+    assert solver == "lcp" or (here / "box-result" / "residuals.png").stat().st_size > 1000
     assert solver in "".join(Said("run", "--help").out.split())
 
 

@@ -34,12 +34,12 @@ Solver = Annotated[
     str | None,
     typer.Option(
         help=f"{STEPPING}solver of the cone problem: auto, gauss-seidel, newton, jacobi, barzilai-borwein, apgd, "
-        "apgd-lean, admm, pyramid. [auto if not given]"
+        "apgd-lean, admm, pyramid, lcp. [auto if not given]"
     ),
 ]
 Iterations = Annotated[int | None, typer.Option(help=f"{STEPPING}largest number of iterations of a velocity solve.")]
 Tolerance = Annotated[float | None, typer.Option(help=f"{STEPPING}residual [m/s] at which iterations stop.")]
-Directions = Annotated[int | None, typer.Option(help=f"{STEPPING}edges of the pyramid of --solver pyramid. [8]")]
+Directions = Annotated[int | None, typer.Option(help=f"{STEPPING}edges of the pyramid of --solver pyramid, lcp. [8]")]
 Coulomb = Annotated[
     bool | None, typer.Option(help=f"{STEPPING}Coulomb's law, or its convex approximation. [Coulomb's law]")
 ]

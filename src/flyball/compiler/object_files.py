@@ -64,6 +64,7 @@ COSTS: dict[str, tuple[str, float]] = {
     "sampled_steps_kernel": ("sampled controllers", 1.5),
     "largest_margin_kernel": ("forces that are shared", 1.3),
     "pyramid": ("the contact solver of pyramids", 1.7),
+    "lcp": ("the contact solver by pivoting", 3.0),
 }
 """Description of each kernel, and the seconds of its compilation on that machine, without the import of Numba."""
 DEFAULT_COST = ("part of the numerics", 0.5)

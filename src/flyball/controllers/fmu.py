@@ -105,9 +105,9 @@ class FMU(LinkedFile, Controller):
     @property
     def coupling(self) -> UnitCoupling:
         """Return how the unit takes part in a motion."""
-        names = (tuple(name for name, _ in x) for x in (self.parameters, self.inputs))
+        parameters, inputs = (tuple(name for name, _ in x) for x in (self.parameters, self.inputs))
         tolerance = None if self.tolerance is None else float(self.tolerance)
-        return UnitCoupling(self.title, str(self.file), *names, tuple(x for _, x in self.named), tolerance)
+        return UnitCoupling(self.title, str(self.file), parameters, inputs, tuple(x for _, x in self.named), tolerance)
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse a unit that cannot be used, and variables that it does not have."""

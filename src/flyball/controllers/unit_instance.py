@@ -152,8 +152,9 @@ def _variable(v: Any, units: Mapping[str, Any]) -> UnitVariable:
     name = v.unit or (declared.unit if declared is not None else None) or ""
     factor, offset, unit = _in_si(name, units.get(name))
     fault = f"is of the type {v.type}" if v.type not in FLOATING else "is an array" if v.dimensions else ""
-    words = (str(x or "") for x in (v.causality, v.variability, v.initial))
-    return UnitVariable(v.name, int(v.valueReference), *words, factor, offset, unit, fault)
+    causality, variability, initial = (str(x or "") for x in (v.causality, v.variability, v.initial))
+    reference = int(v.valueReference)
+    return UnitVariable(v.name, reference, causality, variability, initial, factor, offset, unit, fault)
 
 
 def _in_si(name: str, base: Any) -> tuple[float, float, str]:

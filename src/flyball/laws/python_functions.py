@@ -281,8 +281,8 @@ def motion_of(functions: Sequence[CalledFunction], continues: bool) -> Iterator[
                     f"{f.where}: a motion cannot continue an earlier one with it, since results do not contain its "
                     f"state; simulate the whole time in one call"
                 )
-        calls = [f.native.python for f in functions]
-        for memory in dict.fromkeys(f.memory for f in calls if isinstance(f, FunctionWithMemory)):
+        calls: list[Any] = [f.native.python for f in functions]
+        for memory in dict.fromkeys(x.memory for x in calls if isinstance(x, FunctionWithMemory)):
             stack.enter_context(memory.motion())
         yield
 

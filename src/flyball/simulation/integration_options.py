@@ -14,7 +14,7 @@ import numpy as np
 from ..analysis_options import AnalysisOptions, names_of, require_count, require_positive, seconds
 from ..engine import stabilization
 from ..errors import ModelError
-from ..numerics.complementarity.solver_choice import solver_names
+from ..numerics.complementarity.solver_choice import PIVOTING_SOLVER, solver_names
 from ..numerics.integrators.butcher_tableaux import tableau
 from .initial_state import refuse_unknown_coordinates as known_coordinates
 
@@ -209,7 +209,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
 RESTITUTION_LAWS = ("poisson", "newton", "moreau")
 CONVEX_ONLY_SOLVERS = ("barzilai-borwein",)
 ALL_STEPS = "all"  # Stepping.history
-PYRAMID, LEAST_DIRECTIONS, DEFAULT_DIRECTIONS = "pyramid", 3, 8
+PYRAMIDS, LEAST_DIRECTIONS, DEFAULT_DIRECTIONS = ("pyramid", PIVOTING_SOLVER), 3, 8
 IMPACT_ORDERS = ("simultaneous", "sequential")
 
 
@@ -239,7 +239,7 @@ class Stepping:
         Residual of the velocities at which iterations stop; 1e-5 of that speed if not given. In very short steps it is
         a hundredth of the velocity that gravity adds in the step, where that is less.
     directions : int, optional
-        Number of edges of the friction pyramid of ``solver="pyramid"``, at least 3; 8 if not given.
+        Number of edges of the friction pyramid of ``solver="pyramid"`` and ``"lcp"``, at least 3; 8 if not given.
     coulomb : bool
         Whether to use Coulomb's law. If not, the convex approximation is solved, in which sliding bodies separate by
         friction coefficient times sliding speed times step.
@@ -289,12 +289,19 @@ class Stepping:
                 "effect; leave one of the two out"
             )
         self._check_history()
-        if self.directions is not None and self.solver != PYRAMID:
-            raise ModelError(f"directions of Stepping is for solver={PYRAMID!r}, not {self.solver!r}; leave it out")
+        if self.directions is not None and self.solver not in PYRAMIDS:
+            which = " and ".join(f"solver={name!r}" for name in PYRAMIDS)
+            raise ModelError(f"directions of Stepping is for {which}, not {self.solver!r}; leave it out")
         if self.directions is not None:
             require_count(self.directions, "directions", LEAST_DIRECTIONS)
-        if self.solver == PYRAMID and not self.coulomb:
-            raise ModelError(f"solver {PYRAMID!r} of Stepping solves Coulomb's law on a pyramid: leave coulomb out")
+        if self.solver in PYRAMIDS and not self.coulomb:
+            raise ModelError(f"solver {self.solver!r} of Stepping solves Coulomb's law on a pyramid: leave coulomb out")
+        for name in ("iterations", "position_iterations", "tolerance", "history"):
+            if self.solver == PIVOTING_SOLVER and getattr(self, name) is not None:
+                raise ModelError(
+                    f"solver {self.solver!r} of Stepping finds the solution by pivoting, without a limit of its "
+                    f"accuracy: leave {name} out"
+                )
         if self.solver in CONVEX_ONLY_SOLVERS and self.coulomb:
             raise ModelError(
                 f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"

@@ -34,7 +34,7 @@ from .contact_problem import (
     allocate_solver,
     empty_problem,
 )
-from .friction_pyramid import pyramid
+from .friction_pyramid import lcp, lcp_storage, pyramid
 from .gauss_seidel import gauss_seidel
 from .jacobi import jacobi
 from .newton import newton
@@ -482,10 +482,13 @@ SOLVERS: dict[str, Kernel] = {
     "apgd-lean": scaled_apgd,
     "admm": admm,
     "pyramid": pyramid,
+    "lcp": lcp,
 }
+PIVOTING_SOLVER = "lcp"  # is called island by island, and no other solver replaces it
 FACTORISING_SOLVERS = {
     "newton",
     "admm",
+    PIVOTING_SOLVER,
 }  # solvers that need `FactorStorage`: called island by island; sweeps solve islands they cannot
 
 # largest islands for Newton's method (contacts, nodes): with similar masses, where 50 sweeps take as long as five
@@ -539,11 +542,13 @@ def prepare_solver(
         return PreparedSolver(auto, made, np.zeros(0, np.int64))
     whole = name != "auto"
     made = allocate_island_solver(P, whole)
+    if name == PIVOTING_SOLVER:
+        made = made._replace(**lcp_storage()._asdict())
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLAND_SOLVER] = first.address
     if name == "auto" and newton_suffices(len(P.node), len(P.group) - 1, len(P.turn) > 0):
         made.limit[:] = unlimited_islands(P)  # few bodies: nothing is left for sweeps
-    else:
+    elif name != PIVOTING_SOLVER:
         made.doors[OTHER_SOLVER] = gauss_seidel.address
     return PreparedSolver(auto, made, made.statistics)
 

@@ -12,6 +12,7 @@ from ...collision.contact_finder import ContactFinder
 from ...collision.tables import DONE, ContactTable, Geometry, Movers
 from ...compiler.kernels import StructBuffer, check_layout
 from ...engine.entry_point import engine
+from ...errors import ModelError
 from ...numerics.complementarity.contact_problem import (
     ContactProblem,
     ContactSolution,
@@ -21,6 +22,8 @@ from ...numerics.complementarity.contact_problem import (
     allocate_solver,
     empty_problem,
 )
+from ...numerics.complementarity.friction_pyramid import MAX_UNKNOWNS
+from ...numerics.complementarity.solver_choice import PIVOTING_SOLVER
 from ...tables.table_definitions import Surfaces, assign, copied, named_arrays
 from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
@@ -309,6 +312,13 @@ class ImpulseStepper:
             status = step_loop_kernel.call(*self._addresses)
             if self.recorder is not None:
                 self.recorder.raise_error()
+            needed = self.workspaces.O.count.needed_numbers if self.solver == PIVOTING_SOLVER else 0
+            if needed > 0:
+                raise ModelError(
+                    f"solver {self.solver!r} of Stepping solves at most {MAX_UNKNOWNS} unknowns for bodies in contact "
+                    f"with each other (2 + directions for a contact with friction), and {needed} are needed; give "
+                    f"fewer directions=, or solver='pyramid'"
+                )
             if status == DONE:
                 return
             if status == NO_SOLUTION:

@@ -44,7 +44,7 @@ from ...tables.table_definitions import BETWEEN, System
 from ...tables.values import Values
 from ..initial_state import InitialState, find_initial_state, initial_state_at
 from ..integration_intervals import Segment
-from ..integration_options import DEFAULT_DIRECTIONS, PYRAMID, RESTITUTION_LAWS, Stepping
+from ..integration_options import DEFAULT_DIRECTIONS, PYRAMIDS, RESTITUTION_LAWS, Stepping
 from .impulse_stepper import ImpulseStepper, free_bodies
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
 from .solve_recorder import SolveRecorder
@@ -634,9 +634,9 @@ def make_stepper(
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], CONTACT_MARGIN * size
     stepper = ImpulseStepper(scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints)
-    if o.solver == PYRAMID and stepper.turning:
+    if o.solver in PYRAMIDS and stepper.turning:
         raise ModelError(
-            f"solver {PYRAMID!r} of Stepping has no rolling or spinning friction; leave rolling_friction and "
+            f"solver {o.solver!r} of Stepping has no rolling or spinning friction; leave rolling_friction and "
             "spinning_friction out, or choose another solver"
         )
     if o.history is not None:
