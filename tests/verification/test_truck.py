@@ -47,30 +47,47 @@ def test_static_loads_are_those_of_the_levers(rest):
     assert moment == pytest.approx(offset, rel=0.05)
 
 
+MASSES = {  # mass, moment of inertia about y, place along the truck; the engine with its shafts, axles with wheels
+    "frame": (2500, 6000, 0.0), "cab": (900, 600, 2.6), "engine": (790, 152.7, 2.2), "bed": (3000, 5000, -1.2),
+    "seat": (90, 5, 2.4), "front": (675, 1e6, 2.4), "rear": (595, 1e6, -2.0),
+}  # fmt: skip
+SPRINGS = [  # between, place, stiffness and damping of both sides; the last ones are springs with braces, and tyres
+    *(("frame", "cab", x, 4e5, 1.2e4) for x in (3.2, 2.0)), *(("frame", "engine", x, 1e6, 6e3) for x in (2.6, 1.8)),
+    *(("frame", "bed", x, 4e6, 2e4) for x in (-2.8, -1.2, 0.4)), *(("cab", "seat", x, 8e3, 4e2) for x in (2.2, 2.6)),
+    ("frame", "front", 2.4, 5.4e5, 3.4e4), ("frame", "rear", -2.0, 8.4e5, 3.4e4),
+    ("", "front", 2.4, 2 * KT, 4e3), ("", "rear", -2.0, 2 * KT, 4e3),
+]  # fmt: skip
+
+
+def small_model():
+    """Eigenvalues of heave and pitch of the bodies on vertical springs, with positive frequency, ascending."""
+    names, n = list(MASSES), 2 * len(MASSES)
+    M = np.array([x for m, J, _ in MASSES.values() for x in (m, J)])
+    K, C = np.zeros((n, n)), np.zeros((n, n))
+    for one, other, x, k, c in SPRINGS:
+        row = np.zeros(n)
+        for sign, name in ((1.0, one), (-1.0, other)):
+            if name:
+                i = 2 * names.index(name)
+                row[i : i + 2] += sign * np.array([1.0, MASSES[name][2] - x])
+        K += k * np.outer(row, row)
+        C += c * np.outer(row, row)
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K / M[:, None], -C / M[:, None]]])
+    values = np.linalg.eigvals(A)
+    return sorted(values[values.imag > 1.0], key=abs)
+
+
 def test_ride_modes_are_those_of_a_small_matrix_model(rest):
-    """Heave, pitch and wheel hop: body on two axles on tyres, four freedoms, against all of the truck."""
-    m = TRUCK["truck"](speed=0.0)
-    found = m.modes(about=rest)
-    frequencies = np.abs(found.eigenvalues[found.eigenvalues.imag > 1.0]) / (2.0 * np.pi)
-    sprung = [b for b in m.bodies if not any(k in b.name for k in ("axle", "rod", "left", "right"))]
-    M = sum(b.mass for b in sprung)
-    x = sum(b.mass * place(rest, b.name)[0] for b in sprung) / M
-    z = sum(b.mass * place(rest, b.name)[2] for b in sprung) / M
-    J = sum(
-        b.inertia[1] + b.mass * ((place(rest, b.name)[0] - x) ** 2 + (place(rest, b.name)[2] - z) ** 2) for b in sprung
-    )
-    lever = np.array([TRUCK["AXLES"]["front"] - x, TRUCK["AXLES"]["rear"] - x])
-    springs, unsprung = 2.0 * np.array([2.5e5, 4e5]), np.array([400 + 2 * 130 + 15, 400 + 2 * 90 + 15])
-    K = np.zeros((4, 4))  # heave, pitch (nose down), front and rear axle
-    for k, (a, c) in enumerate(zip(lever, springs, strict=True)):
-        row = np.array([1.0, -a, 0.0, 0.0])
-        row[2 + k] = -1.0
-        K += c * np.outer(row, row)
-        K[2 + k, 2 + k] += 2.0 * KT
-    expected = np.sqrt(np.linalg.eigvals(np.linalg.solve(np.diag([M, J, *unsprung]), K)).real) / (2.0 * np.pi)
-    print(expected, frequencies)
-    for f in expected:
-        assert np.abs(frequencies - f).min() < 0.06 * f
+    """Frequency and damping: heave 1.7 Hz, pitch 2.0 Hz, wheel hop 8.9 and 10.9 Hz; in all nine of twelve modes.
+
+    Only the seat, the pitch of the cab and a mode with it differ by more than 4 %: their mounts act along x as well.
+    """
+    found = TRUCK["truck"](speed=0.0).modes(about=rest).eigenvalues
+    expected = small_model()
+    apart = np.array([np.abs(found - x).min() / abs(x) for x in expected])
+    heave, pitch, hops = 0, 2, [7, 8]
+    assert len(expected) == 12 and (apart < 0.04).sum() >= 9
+    assert apart[[heave, pitch, *hops]].max() < 0.035
 
 
 def test_lane_change_follows_its_path():
