@@ -43,7 +43,7 @@ def ramp(spacing: float = 0.05) -> fb.RoadProfile:
 
 
 def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 8.0, lane: float = 0.0) -> fb.Mechanism:
-    """The truck; ``lane``: how far to the left the driver changes near x = 45 m [m]."""
+    """The truck; ``lane``: how far to the left the driver changes near x = 60 m [m]. At rest nobody drives it."""
     m = fb.Mechanism("truck", gravity=(0, 0, -9.81), parameters={"v": speed})
     m.add(fb.Road("road", surface=surface))
     if isinstance(surface, fb.RoadProfile):  # to be seen
@@ -74,9 +74,10 @@ def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 
             mount("frame", "bed", (x, 0.6 * s, 1.2), 2e6, 1e4)
         for x in (2.2, 2.6):
             mount("cab", "seat", (x, 0.5 + 0.2 * s, 1.8), 4e3, 2e2)
-    _driver(m, lane)
+    if speed:
+        _driver(m, lane)
     for axle in AXLES:
-        _axle(m, axle, body, mount)
+        _axle(m, axle, body, mount, bool(speed))
     _driveline(m, body, speed)
     return m
 
@@ -84,7 +85,7 @@ def truck(surface: fb.RoadProfile | fb.RandomRoad | None = None, speed: float = 
 def _driver(m: fb.Mechanism, lane: float) -> None:
     """Who holds the speed by throttle and brake, and steers along a path."""
     x = np.arange(-10.0, 300.0, 5.0)
-    path = np.c_[x, lane * (0.5 + 0.5 * np.tanh((x - 45.0) / 12.0))]
+    path = np.c_[x, lane * (0.5 + 0.5 * np.tanh((x - 60.0) / 20.0))]
     m.add(fb.SpeedDriver("pedals", setpoint="v", measured="frame.vx", kp=0.5, ki=0.1, initial=0.1))
     m.add(fb.Lag("pressure", of="pedals.brake", time=0.1))
     m.add(fb.PathDriver("steers", "frame", path=path, rear=(AXLES["rear"], 0, 0), wheelbase=WHEELBASE, start=8.0))
@@ -93,20 +94,21 @@ def _driver(m: fb.Mechanism, lane: float) -> None:
 def _driveline(m: fb.Mechanism, body, speed: float) -> None:
     """Crankshaft and output shaft in the engine, gear box between them, differential to the rear wheels."""
     rate = FINAL * speed / (RADIUS - 0.01)  # of the output shaft [rad/s]
-    gear = next((k for k, r in enumerate(RATIOS, 1) if r * rate < 220.0), len(RATIOS)) if speed else 0
+    gear = next((k for k, r in enumerate(RATIOS, 1) if r * rate < 220.0), len(RATIOS))
     shafts = (("crank", 60, 2.5, 2.3, RATIOS[gear - 1] * rate), ("output", 30, 0.2, 1.7, rate))
     disc = fb.Cylinder(radius=0.2, length=0.1, orientation=(0, "90 deg", 0))
     for name, mass, inertia, x, turns in shafts:
         body(name, mass, (inertia,) * 3, (x, 0, 1.0), angular_velocity=(turns, 0, 0), shape=disc)
         m.add(fb.Revolute(f"{name}_bearing", "engine", name, at=(x, 0, 1.0), axis=(1, 0, 0)))
-    m.add(fb.EngineMap("diesel", "crank_bearing", throttle="pedals.throttle", **ENGINE))
     angles = ("crank_bearing.angle", "output_bearing.angle")
-    m.add(fb.GearBox("box", *angles, ratios=RATIOS, capacity=1500, gear=gear, up="2200 rpm", down="1000 rpm"))
+    if speed:
+        m.add(fb.EngineMap("diesel", "crank_bearing", throttle="pedals.throttle", **ENGINE))
+        m.add(fb.GearBox("box", *angles, ratios=RATIOS, capacity=1500, gear=gear, up="2200 rpm", down="1000 rpm"))
     spins = tuple(f"spin rear {side}.angle" for side in SIDES)
-    m.add(fb.Coupler("differential", ("output_bearing.angle", *spins), weights=(1, -FINAL / 2, -FINAL / 2)))
+    m.add(fb.Coupler("differential", (angles[1], *spins), weights=(1, -FINAL / 2, -FINAL / 2)))
 
 
-def _axle(m: fb.Mechanism, axle: str, body, mount) -> None:
+def _axle(m: fb.Mechanism, axle: str, body, mount, driven: bool) -> None:
     """One axle beam with its springs, radius rods, wheels and tyres."""
     x, front = AXLES[axle], axle == "front"
     beam, height = f"{axle} axle", RADIUS - 0.03
@@ -125,10 +127,10 @@ def _axle(m: fb.Mechanism, axle: str, body, mount) -> None:
         at = (x, 0.6 * s, height)
         m.add(fb.Universal(f"eye {axle} {side}", beam, rod, at=at, axes=((0, 1, 0), (0, 0, 1))))
         m.add(fb.Spherical(f"ball {axle} {side}", "frame", rod, at=(x + reach, 0.6 * s, height + 0.1)))
-        _wheel(m, axle, side, body)
+        _wheel(m, axle, side, body, driven)
 
 
-def _wheel(m: fb.Mechanism, axle: str, side: str, body) -> None:
+def _wheel(m: fb.Mechanism, axle: str, side: str, body, driven: bool) -> None:
     """A wheel with its tyre and brake: in front on kingpin and spin axis, which the driver turns, behind driven."""
     front = axle == "front"
     wheel, at = f"{axle} {side}", (AXLES[axle], 1.0 * SIDES[side], RADIUS - 0.03)
@@ -137,13 +139,14 @@ def _wheel(m: fb.Mechanism, axle: str, side: str, body) -> None:
          angular_velocity=(0, f"v/{RADIUS - 0.01}", 0), shape=turned)  # fmt: skip
     if front:
         m.add(fb.Universal(f"hub {side}", "front axle", wheel, at=at, axes=((0, 0, 1), (0, 1, 0))))
-        steering = {"stiffness": 2e5, "damping": 2e3, "force": "2e5*steers"}
+        steering = {"stiffness": 2e5, "damping": 2e3, "force": "2e5*steers" if driven else None}
         m.add(fb.CoordinateSpring(f"steering {side}", f"hub {side}.angle_1", **steering))
         spin = f"hub {side}.angle_2"
     else:
         m.add(fb.Revolute(f"spin {wheel}", "rear axle", wheel, at=at, axis=(0, 1, 0)))
         spin = f"spin {wheel}.angle"
-    m.add(fb.Actuator(f"brake {wheel}", spin, force="-9e3*pressure*tanh(rate/0.2)"))
+    if driven:
+        m.add(fb.Actuator(f"brake {wheel}", spin, force="-9e3*pressure*tanh(rate/0.2)"))
     m.add(fb.Tyre(f"tyre {wheel}", "road", wheel, model=TYRE))
 
 

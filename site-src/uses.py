@@ -122,6 +122,10 @@ USES = {
     "GravityCompensatedPD": 'fb.GravityCompensatedPD("pd", coordinates=["A.angle"], reference=["1"], kp=50, kd=10)',
     "Integrator": 'fb.Integrator("sum", of="0.2 - slide.displacement", gain=2)',
     "Lag": 'fb.Lag("valve", of="command", time="20 ms")',
+    "SpeedDriver": 'fb.SpeedDriver("pedals", setpoint="20", measured="car.vx", kp=0.5, ki=0.1)',
+    "PathDriver": (
+        'fb.PathDriver("steers", "car", path=[(0, 0), (30, 0), (60, 3.5), (90, 3.5), (200, 3.5)], wheelbase=2.7)'
+    ),
     "PID": 'fb.PID("pid", setpoint="0.2", measured="slide.displacement", kp=80, ki=60, kd=12, filter="20 ms")',
     "State": 'fb.State("heat", rate="power - 0.1*heat", initial=0)',
     "StateSpace": 'fb.StateSpace("law", inputs=["A.angle", "A.angle_rate"], D=[[-40, -6]], period="10 ms")',

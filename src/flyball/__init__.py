@@ -110,7 +110,9 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .controllers.gravity_compensated_pd import GravityCompensatedPD as GravityCompensatedPD
     from .controllers.integrator import Integrator as Integrator
     from .controllers.lag import Lag as Lag
+    from .controllers.path_driver import PathDriver as PathDriver
     from .controllers.pid import PID as PID
+    from .controllers.speed_driver import SpeedDriver as SpeedDriver
     from .controllers.state import State as State
     from .controllers.state_space import StateSpace as StateSpace
     from .controllers.transfer import Transfer as Transfer

@@ -115,5 +115,21 @@ def test_a_wheel_below_its_road_stops_the_motion():
     m.add(fb.Body("wheel", mass=20, inertia=(1, 1, 1), position=(0, 0, -5)))
     model = fb.LinearTyre(radius=0.3, stiffness=2e5, nominal_load=4e3, slip_stiffness=8e4, cornering_stiffness=6e4)
     m.add(fb.Tyre("tyre", "ground", "wheel", model=model))
-    with pytest.raises(fb.FlyballError, match="The centre of the wheel is 5 m beneath .ground."):
+    with pytest.raises(fb.FlyballError, match=r"The centre of the wheel is 5 m beneath 'ground'"):
         m.simulate(0.1)
+
+
+def test_a_flat_wheel_stops_the_motion_by_its_axis():
+    m = fb.Mechanism("flat wheel", gravity=(0, 0, -9.81))
+    m.add(fb.Body("wheel", mass=20, inertia=(1, 1, 1), position=(0, 0, 0.2), orientation=("90 deg", 0, 0)))
+    m.add(fb.Tyre("tyre", "ground", "wheel", model=SAMPLES["LinearTyre"]))
+    with pytest.raises(fb.FlyballError, match=r"lies flat on 'ground'.*axis is y of 'wheel'"):
+        m.simulate(0.1)
+
+
+@models
+def test_rolling_resistance_is_against_the_spin(model):
+    """A locked wheel that slides has none, a wheel that spins backwards while it slides forwards the reverse one."""
+    moments = [state(model, (0.0, 0.0), lean=0.0, steer=0.0, spin=w)[4][3] for w in (30.0, 0.0, -30.0)]
+    assert moments[0] < 0.0
+    assert moments[1:] == pytest.approx([0.0, -moments[0]], abs=0.1 * abs(moments[0]))  # of a spin of 0.02 rad/s

@@ -46,6 +46,7 @@ EVENTS = {  # see test_events: what holds in them changes at instants, or may
     "geneva_drive.toml",
     "ratchet.toml",
     "safety_brake.toml",
+    "truck.py",
 }
 LARGE = {"truck.py", "bogie_on_rollers.py"}  # roads and profiles are tables, which are not written out with symbols
 EQUATIONS = [name for name in FILES if name not in EVENTS | LARGE]

@@ -99,6 +99,46 @@ def test_a_curved_opencrg_file(tmp_path):
     assert (zx, zy) == pytest.approx(tuple(slopes), rel=1e-9)
 
 
+def bend(hold, t=(-2.0, 1.0), turn=0.02):
+    """A bend of 50 m radius whose height is its arc length / 20: numbers, and the line (60, 2)."""
+    heading = turn * np.arange(60)
+    line = np.cumsum(np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
+    z = np.repeat(0.05 * np.arange(60.0)[:, None], 5, axis=1)
+    return pack_curved(z, (0.0, 1.0), t, line, hold), line, heading
+
+
+def test_edges_of_a_curved_road_are_held():
+    """Far to either side the height is that of the edge; beyond the ends that of the end; without hold there is none."""
+    data, line, heading = bend(True)
+    for k, side in ((20, 10.0), (30, -25.0), (40, 30.0)):
+        normal = np.array([-np.sin(heading[k] + 0.01), np.cos(heading[k] + 0.01)])
+        at = line[k] + side * normal
+        z, zx, zy = road_height(data, 0, *at)
+        assert z == pytest.approx(0.05 * k, abs=5e-3)
+        assert normal @ (zx, zy) == pytest.approx(0.0, abs=1e-3)
+    end = line[-1] + 40.0 * np.array([np.cos(heading[-1]), np.sin(heading[-1])])
+    assert road_height(data, 0, *end) == pytest.approx((0.05 * 59, 0.0, 0.0), abs=1e-6)
+    assert np.isnan(road_height(bend(False)[0], 0, *end)[0])
+
+
+@pytest.mark.parametrize(("first", "radius"), [(-3.0, 3.1), (-1.0, 5.1)])
+def test_legs_of_a_serpentine_are_told_apart(first, radius):
+    """Two straight legs and a half circle, the legs nearly touching: each point has the height of its own leg."""
+    straight, step = 40.0, 0.5
+    s = np.arange(0.0, 2 * straight + np.pi * radius, step)
+    turn = np.clip((s - straight) / radius, 0.0, np.pi)
+    back = np.clip(s - straight - np.pi * radius, 0.0, None)
+    x = np.minimum(s, straight) + radius * np.sin(turn) - back
+    line = np.stack([x, radius * (1.0 - np.cos(turn))], axis=1)
+    z = np.repeat(0.01 * s[:, None], 7, axis=1)
+    data = pack_curved(z, (0.0, step), (first, 1.0), line, False)
+    for left in first + np.array([0.02, 3.0, 5.98]):
+        for at in (5.0, 20.3, 35.0):
+            assert road_height(data, 0, at, left)[0] == pytest.approx(0.01 * at, abs=1e-4)
+            way = 2 * straight + np.pi * radius - at
+            assert road_height(data, 0, at, 2 * radius - left)[0] == pytest.approx(0.01 * way, abs=1e-3)
+
+
 def test_a_road_that_crosses_itself_is_refused(tmp_path):
     rows = [[0.1 * k if k else None, 0.0, 0.0, 0.0] for k in range(80)]
     with pytest.raises(fb.ModelError, match="crosses itself"):

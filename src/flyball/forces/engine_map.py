@@ -23,10 +23,10 @@ BAND = 0.05  # of idle speed or speed limit: range in which governor and limiter
 class EngineMap(JointForce):
     """An engine whose torque is a function of speed and throttle, given on a grid.
 
-    Between the points the torque is bicubic (`Table2D`), beyond them it continues with the slope of the edge. The row of the closed throttle
-    is the drag of the engine: engine braking. An idle governor opens the throttle where the speed falls below ``idle``,
-    fully at 5 % less; a limiter closes it at ``limit``, from 5 % below on. With the throttle p of the driver, that of
-    the engine is (1 - (1 - p)(1 - p_idle)) p_limit.
+    Between the points the torque is bicubic (`Table2D`), beyond them it continues with the slope of the edge. The row
+    of the closed throttle is the drag of the engine: engine braking. An idle governor opens the throttle where the
+    speed falls below ``idle``, fully at 5 % less; a limiter closes it at ``limit``, from 5 % below on. With the
+    throttle p of the driver, that of the engine is (1 - (1 - p)(1 - p_idle)) p_limit.
 
     Its parts belong to it: the table ``NAME_map``, the `Motor` ``NAME_torque``, and with ``inertia`` the `RotorInertia`
     ``NAME_rotor``.

@@ -206,7 +206,8 @@ def tyre_warnings(result: Result) -> list[str]:
 def lifted_wheel_warnings(result: Result) -> list[str]:
     """Return a warning for each tyre without load at some output times: when, and how far it is from its road."""
     found = []
-    for e in (x for x in result.values.structure.forces if hasattr(x, "model")):
+    forces: list[Any] = result.values.structure.forces
+    for e in (x for x in forces if hasattr(x, "model")):
         curves = result[e.name]
         lifted = curves.load <= 0.0
         if not lifted.any():
