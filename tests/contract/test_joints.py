@@ -81,7 +81,7 @@ def test_coordinates_and_their_derivatives(where, name):
         assert at_moments(rate) == pytest.approx(difference(value), rel=close[0], abs=1e-7)
         assert at_moments(second) == pytest.approx(difference(rate), rel=close[1], abs=1e-6)
         start = joint.element.offset(r.values.numbers["J"], what)
-        start += AS_DRAWN[name](joint.element.at) if name in AS_DRAWN else 0.0
+        start += AS_DRAWN[name](joint.element, what) if name in AS_DRAWN else 0.0
         if name != "PointOnCurve":  # its position is counted from the first point of the curve
             assert value[0] == pytest.approx(start, abs=1e-12), "as drawn"
     if "angle" in own:
