@@ -97,7 +97,7 @@ def test_angles_and_displacements_mean_what_they_say(where, name):
     F, M = (r.records.frame(s.frame_at["J", k, ""]) for k in "FM")
     RF, RM = (np.stack(x[1], axis=1).reshape(-1, 3, 3) for x in (F, M))
     way = np.einsum("nji,nj->ni", RF, np.stack(M[0], axis=1) - np.stack(F[0], axis=1))
-    if "angle" in own and name != "Planar":
+    if "angle" in own and name != "Planar" and (where, name) != ("space", "RopeSpan"):  # which leaves all turns free
         turn = Rotation.from_matrix(np.einsum("nji,njk->nik", RF, RM)).as_rotvec()
         axis = 1 if own["angle"].turn_F else 2
         value = np.unwrap(turn[:, axis]) + r["J"].angle[0]

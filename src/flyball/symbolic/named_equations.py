@@ -552,8 +552,8 @@ def _cleaner(
     owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
     directions = {int(S.terms.hint[k]): k for k, t in enumerate(s.terms) if t.formula.kind == TANGENT}
     for at, k in directions.items():
-        t = s.terms[k]
-        new.append((T.z[at], angles.of_tangent(T.work, t.F, t.M, row_parameters(S.term_parameters, k))))
+        F, M = s.terms[k].F, s.terms[k].M
+        new.append((T.z[at], angles.of_tangent(T.work, F, M, row_parameters(S.term_parameters, k))))
     for name, at in s.state_at.items():
         if at < len(s.controls) or name.endswith((".work", ".place")):
             continue
