@@ -33,6 +33,7 @@ USES = {
     "PinInSlot": 'fb.PinInSlot("slot", "lever", "block", at=(0, 0.3), axis=(0, 1))',
     "Planar": 'fb.Planar("table", "ground", "puck", at=(0, 0, 0), axis=(0, 0, 1))',
     "PointInPlane": 'fb.PointInPlane("rest", "ground", "foot", at=(0, 0, 0), axis=(0, 0, 1))',
+    "RopeSpan": 'fb.RopeSpan("part", "drum", "load", at=((0, 0), (0.1, -2)), radii=(-0.1, 0))',
     "PointOnCurve": (
         'fb.PointOnCurve("wire", "ground", "bead", at=(0.4, 0, 0), formulas=("0.4*cos(u)", "0.4*sin(u)", "-0.02*u"), '
         "interval=(0, '8*pi'))"

@@ -17,7 +17,7 @@ Describe a mechanism
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, PointOnCurve, Cam,
                   FlatFacedCam, WheelOnLine, RollingDisk, RollingBall, KnifeEdge; LinearActuator: a cylinder, whose
-                  length is a coordinate
+                  length is a coordinate; RopeSpan: part of a Rope over pulleys
     couplings     GearPair, RackAndPinion, Coupler; Constraint: any equation of coordinates and time
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, PathSpring, Bushing, Rope, Detent,
                   Actuator, Motor, Rubber, RotorInertia, JointFriction, Clutch, Brake, PointForce, PointTorque,

@@ -22,6 +22,7 @@ from flyball.constraints import (
     rotation_component,
     skew_lines,
     space_curve,
+    tangent,
 )
 from flyball.constraints.registry import KINDS
 from flyball.joints.flat_faced_cam import support_function
@@ -37,9 +38,11 @@ KNOT = [
 ]
 WIRE = space_curve_splines(tuple(KNOT), True)[1]
 EXTENT = support_function(tuple(OVAL))
-DATA = np.concatenate([*SPLINES, *WIRE, EXTENT])
+RADII = [0.7, -0.4]
+DATA = np.concatenate([*SPLINES, *WIRE, EXTENT, RADII])
 WIRE_AT = sum(map(len, SPLINES))
 EXTENT_AT = float(WIRE_AT + sum(map(len, WIRE)))
+RADII_AT = EXTENT_AT + len(EXTENT)
 
 ASSEMBLY = (alignment.KIND_AXIS, alignment.KIND_FULL)  # stand-ins while a joint is far from closed: no motion
 AXES = (0.36, 0.48, 0.8, 0.6, 0.0, -0.8, 0.3, 1.0)  # two unit axes; a constant; the coefficient, which no row reads
@@ -72,6 +75,10 @@ PARAMETERS = {
     inclination.KIND_ANGLE: {"angle": AXES},
     inclination.KIND_PITCH: {"pitch": AXES},
     rotation_component.KIND: {"": AXES},
+    tangent.KIND: {
+        "open": (0.0, RADII_AT, 0.0, 0.0, 0.0, 0.0, 0.3, 1.0),
+        "crossed": (0.0, RADII_AT + 1, 0.0, 0.0, 0.0, 0.0, 0.3, 1.0),
+    },
 }
 CASES = [(kind, name) for kind, sets in PARAMETERS.items() for name in sets]
 WORLD = (coincident.KIND, skew_lines.KIND)  # they speak of an axis of the world, not of their frames

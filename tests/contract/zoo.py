@@ -45,6 +45,7 @@ SPATIAL = {
     "PointOnCurve": {"points": LOOP, "centre": P, "at": (P[0] + 0.3 * C, P[1] + 0.2 * S, P[2] + 0.05), "closed": True},
     "PointOnLine": {"at": P, "axis": AXIS, "displacement": 0.1},
     "Prismatic": {"at": P, "axis": AXIS, "displacement": 0.2},
+    "RopeSpan": {"at": (P, Q), "radii": (0.02, -0.03), "axis": AXIS},
     "Revolute": {"at": P, "axis": AXIS, "angle": 2.0},
     "RollingBall": {"at": Q, "radius": 0.15, "normal": AXIS},
     "RollingDisk": {"at": Q, "radius": 0.15, "tread": 0.04, "axis": SKEW, "normal": AXIS},
@@ -70,14 +71,27 @@ PLANAR = {
     "PointOnCurve": {"points": OVAL, "centre": P[:2], "at": (P[0] + 0.3 * C, P[1] + 0.2 * S), "closed": True},
     "PointOnLine": {"at": P[:2], "axis": (1.0, 2.0)},
     "Prismatic": {"at": P[:2], "axis": (1.0, 2.0), "displacement": 0.2},
+    "RopeSpan": {"at": (P[:2], Q[:2]), "radii": (0.02, -0.03)},
     "Revolute": {"at": P[:2], "angle": 2.0},
     "Translational": {"at": P[:2], "axis": (1.0, 2.0)},
     "WheelOnLine": {"at": P[:2], "axis": (1.0, 2.0), "centre": (P[0] - 0.2, P[1] + 0.1), "angle": 0.2},
 }
 
 SPLINED = ("Cam", "FlatFacedCam", "PointOnCurve")  # third derivatives of their curves jump
-AS_DRAWN = {"LinearActuator": lambda at: np.linalg.norm(np.subtract(*at))}
+AS_DRAWN = {
+    "LinearActuator": lambda e, what: np.linalg.norm(np.subtract(*e.at)),
+    "RopeSpan": lambda e, what: _span_as_drawn(e) if what == "length" else 0.0,
+}
 """Value of the coordinate as drawn, of joints whose coordinates are not 0 there."""
+
+
+def _span_as_drawn(e) -> float:
+    """Length of the tangent of two circles, less the difference of their radii times its direction."""
+    d, b = np.subtract(*e.at[::-1]), e.radii[1] - e.radii[0]
+    x, y, z = d @ NORMAL if len(d) == 3 else (*d, 0.0)
+    along, across = np.sqrt(x * x + y * y - b * b), np.arctan2(y, x)
+    return np.hypot(along, z) - b * (across - np.arcsin(b / np.hypot(x, y)))
+
 
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]
 
@@ -99,6 +113,7 @@ REMOVED = {
         "PointOnCurve": 2,
         "PointOnLine": 2,
         "Prismatic": 5,
+        "RopeSpan": 0,
         "Revolute": 5,
         "RollingBall": 3,
         "RollingDisk": 3,
@@ -118,6 +133,7 @@ REMOVED = {
         "PointOnCurve": 1,
         "PointOnLine": 1,
         "Prismatic": 2,
+        "RopeSpan": 0,
         "Revolute": 2,
         "Translational": 2,
         "WheelOnLine": 2,

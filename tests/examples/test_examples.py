@@ -63,6 +63,7 @@ PROMISED = {
     "cam.py",
     "cam_follower.toml",
     "capstan.toml",
+    "crane.toml",
     "car.toml",
     "car_axis.toml",
     "cart_pole_swing_up.py",

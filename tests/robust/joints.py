@@ -31,6 +31,14 @@ def _linear_actuator(d: Dice, name: str, i: str, j: str, p):
     return fb.LinearActuator(name, i, j, at=(p, plus(p, d.size(1e-3, 1.0), d.direction())))
 
 
+def _rope_span(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    axis = {} if d.planar else {"axis": a}
+    side = d.direction() if d.planar else d.square_to(a)
+    r = d.size(1e-3, 1.0)
+    return fb.RopeSpan(name, i, j, at=(p, plus(p, 3.0 * r, side)), radii=(r, -0.5 * r), **axis)
+
+
 def _universal(d: Dice, name: str, i: str, j: str, p):
     a = d.direction()
     return fb.Universal(name, i, j, at=p, axes=(a, d.square_to(a)))
@@ -106,6 +114,7 @@ PLANAR = {
     "PinInSlot": _axis("PinInSlot"),
     "Distance": _distance,
     "LinearActuator": _linear_actuator,
+    "RopeSpan": _rope_span,
     "Orientation": _at("Orientation"),
     "Fixed": _at("Fixed"),
     "WheelOnLine": _wheel,
@@ -129,6 +138,7 @@ SPATIAL = {
     "Screw": _screw,
     "Distance": _distance,
     "LinearActuator": _linear_actuator,
+    "RopeSpan": _rope_span,
     "RollingDisk": _rolling_disk,
     "RollingBall": _rolling_ball,
     "KnifeEdge": _knife_edge,

@@ -82,6 +82,10 @@ def undefined_row(c: CompiledMechanism) -> str:
     """
     s, S, W = c.structure, c.values.system, c.work
     for k, t in enumerate(s.terms):
+        if isinstance(t.owner, Joint):
+            distance = float(np.linalg.norm(W.frames.position[t.M] - W.frames.position[t.F]))
+            if text := t.owner.degenerate(c.values.numbers[t.owner.name], distance, AT_ONE_POINT * c.values.length):
+                return text
         singular = t.owner is not None and t.owner.coordinates[t.what].singular
         if s.term_code[k] is None and not singular:
             continue
@@ -100,6 +104,7 @@ def undefined_row(c: CompiledMechanism) -> str:
     return ""
 
 
+AT_ONE_POINT = 1e-5  # relative to the mechanism's length: to this a fault at coinciding points is attributed
 NEAR_SINGULAR = 0.02  # [rad] from a singular position: to this a fault there is attributed
 OTHER_COORDINATES = (
     "Use another of its coordinates there, or frames whose axes are turned so that the motion keeps away from it"

@@ -19,6 +19,22 @@ if TYPE_CHECKING:
 LITTLE = 1e-6  # kg, kg m^2: inertia of bodies whose motion is prescribed
 
 
+@element
+class DriveCoupling(Clutch):
+    """The clutch of a drive of given speed, whose capacity is the drive's limit."""
+
+    drive: str = ""  # title of the drive, for messages
+
+    in_files: ClassVar[bool] = False
+    words: ClassVar[dict[str, str]] = {"capacity": "limit"}
+    fails: ClassVar[str] = "Its limit is negative there; a law such as 'max(0, ...)' never is"
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Return kind and name of the drive, for messages."""
+        return self.drive
+
+
 class Drive:
     """Base class of elements that act along a coordinate by the law of a force, or of a speed up to a largest force."""
 
@@ -76,7 +92,7 @@ class Drive:
             Body(shaft, mass=LITTLE, inertia=LITTLE if model.planar else (LITTLE,) * 3, position=(0.0,) * n),
             joint(guide, "ground", shaft, at=(0.0,) * n, axis=axis),
             Driver(drive, f"{guide}.{moves}{RATE}", self.speed),
-            Clutch(coupling, f"{guide}.{moves}", coordinate, capacity=self.limit),
+            DriveCoupling(coupling, f"{guide}.{moves}", coordinate, capacity=self.limit, drive=self.title),
         )
 
     def transmitted(self) -> str:

@@ -89,6 +89,15 @@ class LinearActuator(Joint):
         if n.at is not None and all(x.real == y.real for x, y in zip(*n.at, strict=True)):
             raise ModelError(f"{self.title}: both its ends are at {n.at[0]} m, where it has no direction; move one")
 
+    def degenerate(self, n: SimpleNamespace, distance: float, near: float) -> str:
+        """Return a message if both ends coincide."""
+        if distance > near:
+            return ""
+        return (
+            f"both ends of {self.title} are at one point, where it has no direction. Give a Limit of "
+            f"'{self.name}.length' that stops it before, or guide its ends past each other"
+        )
+
     def parts(self, model: Model) -> tuple[Element, ...]:
         """Return barrel and rod with their joints, and its driver or actuator."""
         masses = () if self.barrel is None else self._telescope(model.planar)

@@ -62,6 +62,16 @@ class RopeSpan(Joint):
         drawn = tangent(tuple(matrix_product(R.T, there - here)), b)[1]
         return (unwrapped(tangent(tuple(matrix_product(F[1].T, M[0] - F[0])), b)[1], drawn),)
 
+    def degenerate(self, n: SimpleNamespace, distance: float, near: float) -> str:
+        """Return a message if no line touches both circles."""
+        if distance > abs(n.radii[1].real - n.radii[0].real) + near:
+            return ""
+        i, j = (f"{x!r} (radius {abs(r.real):g} m)" for x, r in zip(self.ends().values(), n.radii, strict=True))
+        return (
+            f"{self.title} has no length left: {i} and {j} are {distance:.6g} m apart, and no line touches both from "
+            "the given sides. Give a Limit that stops the motion before"
+        )
+
     def end_message(self, n: SimpleNamespace, at: float) -> str:
         """Return nothing: it has no ends."""
         return ""

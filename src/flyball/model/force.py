@@ -187,6 +187,7 @@ class CoordinateForce(Force):
         "force": ("N", "N*m"),
     }
     not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be negative
+    words: ClassVar[dict[str, str]] = {}  # law -> its name in messages, if that is another
     sign: ClassVar[float] = 1.0  # sign of the output after value and rate, relative to the effort
     odd: ClassVar[tuple[str, ...] | None] = None  # fields that change sign with its direction; None: it has one
     adds_inertia: ClassVar[bool] = False  # whether it adds inertia to the mass matrix along a joint's coordinate

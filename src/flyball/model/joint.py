@@ -210,6 +210,13 @@ class Joint(Element):
         """Return the coefficient of a coordinate that is added to a row (``Row.plus``)."""
         raise NotImplementedError
 
+    def degenerate(self, n: SimpleNamespace, distance: float, near: float) -> str:
+        """Return why its coordinates have no value, if they have none.
+
+        ``distance`` is that of the origins of F and M [m]; differences less than ``near`` [m] count as zero.
+        """
+        return ""
+
     def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
         """Return the sign of the first row's force while a one-sided contact pushes; 0: unknown, None: two-sided."""
         return 1.0

@@ -408,7 +408,7 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
             elif value is not None and name in fields_with(e.__class__, LawOf):
                 tables = {x.name: x for x in model.tables}
                 names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
-                where = f"{name} of {e.title}"
+                where = f"{e.words.get(name, name)} of {e.title}"
                 law = law_expression(value, pair[turning], where, tables, names, any(is_curve(model, k) for k in names))
                 if name in e.not_negative and law.names <= set(env) and not law.tables and law.function is None:
                     given = law.evaluate(env)

@@ -28,6 +28,7 @@ from ..model.output_files import (
     write_file,
 )
 from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
+from ..model.snapshot import hidden_parts
 from ..tables.values import Values, values
 from .contacts import Contacts, concatenate_contacts
 from .energy_balance import CONTACT_ELASTIC, Energy, EnergyBudget, total_budget
@@ -389,8 +390,14 @@ class Result:
         m, planar = self.model, self.planar
         names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
         names += [f"{d.name}.effort" for d in m.drivers]
-        names += [f"{j.name}.{what}" for j in m.joints for what in j.independent(planar)]
-        names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
+        hidden = hidden_parts(m)
+        names += [f"{j.name}.{what}" for j in m.joints if j.name not in hidden for what in j.independent(planar)]
+        names += [
+            f"{b.name}.{a}"
+            for b in m.bodies
+            if b.name not in hidden
+            for a in (("x", "y", "angle") if planar else "xyz")
+        ]
         return names[:SHOWN_CURVES]
 
     def as_dict(self) -> dict[str, Any]:

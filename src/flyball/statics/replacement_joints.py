@@ -224,7 +224,10 @@ def _is_rotation(model: Model, e: Element, w: Switch) -> bool:
 def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
     """Constraint that keeps the quantity of a switch at its present value."""
     if w.along:
-        weights = e.switch_weights(x.numbers[e.name], w.label) if w.summed else (1.0,)
+        n = x.numbers[e.name]
+        weights = e.switch_weights(n, w.label) if w.summed else (1.0,)
+        middle = e.total(n) if hasattr(e, "total") else None  # from which the quantity is measured
+        value += 0.0 if middle is None else float(np.real(middle))
         return HeldCoordinate(e.name, w.along, weights=tuple(float(np.real(x)) for x in weights), value=value)
     if len(w.path) == 1:
         ends = [x.poses.world(FrameSpec(0, e, role)) for role in e.ends()]

@@ -29,6 +29,8 @@ from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..constraints.registry import Kind
+from ..constraints.tangent import KIND as TANGENT
+from ..constraints.tangent import tangent
 from ..engine.kinematics import load_record, twist_column
 from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
 from ..engine.rows import row_parameters
@@ -48,7 +50,7 @@ from ..expression_graph.graph import (
 from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations, with_prescribed_rows
 from ..math.scalar import atan2
 from ..math.spline import BREAKS
-from ..math.vec import dot
+from ..math.vec import dot, mtv, sub
 from ..model.body import Body, Driver, Frame
 from ..model.controller_signals import ConnectedState
 from ..model.element import Element
@@ -356,6 +358,16 @@ class ClosedFormAngles:
         whole = math.floor((_real(drawn_there) - _real(drawn_here)) / FULL_TURN + 0.5)
         return there - here - FULL_TURN * whole
 
+    def of_tangent(self, W: Any, F: int, M: int, par: Any) -> Any:
+        """Direction of a rope between circles about the origins of two frames, in the first."""
+        S = self.x.system
+        here, there = load_record(W.frames, F), load_record(W.frames, M)
+        d, b = sub(there[0], here[0]), S.const[int(par[1].real)]
+        if not self.x.structure.model.planar:
+            return tangent(mtv(here[1], d), b)[1]
+        body = int(S.frame_body[F])
+        return tangent(d, b)[1] - (self._since[body] - self._reference_angle(body))
+
     def _turned(self, W: Any) -> dict[int, Any]:
         """Angle of every body of a planar mechanism: reference angle plus its coordinates."""
         S, x = self.x.system, self.x
@@ -536,8 +548,12 @@ def _cleaner(
     x: Values, T: TracedEquations, user_q: list[Any], more: list[int], new: list[tuple[Node, Any]]
 ) -> TurnElimination:
     angles = ClosedFormAngles(x, user_q, T.work)
-    s, unknown = x.structure, []
+    s, S, unknown = x.structure, T.system, []
     owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
+    directions = {int(S.terms.hint[k]): k for k, t in enumerate(s.terms) if t.formula.kind == TANGENT}
+    for at, k in directions.items():
+        F, M = s.terms[k].F, s.terms[k].M
+        new.append((T.z[at], angles.of_tangent(T.work, F, M, row_parameters(S.term_parameters, k))))
     for name, at in s.state_at.items():
         if at < len(s.controls) or name.endswith((".work", ".place")):
             continue

@@ -76,7 +76,8 @@ def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
     if other := e.measured_with():
         for role in e.ends():  # for results
             frame_index(s, e, role)
-        return _acting_quantity(s, s.model[other])  # type: ignore[arg-type]
+        if isinstance(limit := s.model[other], CoordinateForce):  # at rest a constraint may replace it
+            return _acting_quantity(s, limit)
     text = e.coordinate_text() or f"{e.name}:length"
     if text in s.measured:
         return s.measured[text]

@@ -406,7 +406,8 @@ def _recorded_path(result: Result, path: PathRequest) -> RecordedPath:
 def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
     """All curves of a small mechanism; of a large one energies, drivers, forces, joint coordinates, then bodies."""
     if 8 * (len(result.model.bodies) + len(result.model.joints)) <= 400:
-        curves = result.channels()
+        hidden = hidden_parts(result.model) & {e.name for e in (*result.model.bodies, *result.model.joints)}
+        curves = {k: c for k, c in result.channels().items() if curve_parts(k)[0] not in hidden}
         curves = {k: c for k, c in curves.items() if np.isfinite(c[1]).any()}
         names = list(curves) if len(curves) <= MAX_CURVES else _main_curves(list(curves), result)
     else:

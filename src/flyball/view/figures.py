@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.snapshot import hidden_parts
 from .recording import Channel, Figure, Panel
 
 if TYPE_CHECKING:
@@ -60,7 +61,9 @@ def energies(result: Result) -> Figure:
 
 def coordinates(result: Result) -> Figure | None:
     """Relative coordinates of the joints; those with small variation in a panel of their own."""
-    every = [(e, what, e.coordinates[what].unit) for e in result.model.joints for what in e.independent(result.planar)]
+    hidden = hidden_parts(result.model)
+    joints = [e for e in result.model.joints if e.name not in hidden]
+    every = [(e, what, e.coordinates[what].unit) for e in joints for what in e.independent(result.planar)]
     units = dict.fromkeys(unit for _, _, unit in every)
     chosen = [c for unit in units for c in evenly_chosen([c for c in every if c[2] == unit])]
     known = {e.name: result[e.name].channels() for e, _, _ in chosen}
@@ -87,7 +90,8 @@ def positions(result: Result) -> Figure | None:
 def reactions(result: Result) -> Figure | None:
     """Magnitudes of the joints' reaction forces, and of their torques if there are any."""
     sizes: dict[str, list[Channel]] = {"N": [], "N*m": []}
-    joints = evenly_chosen(result.model.joints)
+    every = [e for e in result.model.joints if e.blocks]
+    joints = evenly_chosen(every)
     for e in joints:
         view = result[e.name]
         name = f"{e.name}*" if view.undetermined else e.name
@@ -100,7 +104,7 @@ def reactions(result: Result) -> Figure | None:
     parts = [Panel(f"|{UNIT_LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
     if not parts:
         return None
-    notes = [count_note(len(joints), len(result.model.joints), "joints")]
+    notes = [count_note(len(joints), len(every), "joints")]
     if any(c.name.endswith("*") for p in parts for c in p.curves):
         notes.append("* redundancy leaves some components undetermined")
     return Figure("reactions", "Joint reactions", tuple(parts), "; ".join(n for n in notes if n))

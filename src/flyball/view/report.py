@@ -250,7 +250,7 @@ def bodies(result: Result) -> ReportTable:
 def joints(result: Result) -> ReportTable:
     """Return initial positions of joints, their constraints, and the largest reactions."""
     p, s, rows = result.planar, result.values.structure, []
-    sizes = {e.name: _largest_reaction(result[e.name]) for e in result.model.joints}
+    sizes = {e.name: _largest_reaction(result[e.name]) for e in result.model.joints if e.blocks}
     passed = {e.name: _largest_coupling_efforts(result[e.name]) for e in result.model.couplings}
     force, torque = (max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1))
     least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # smaller values are rounding errors
@@ -264,7 +264,7 @@ def joints(result: Result) -> ReportTable:
         count = str(len(e.rows(p))) if isinstance(e, Joint) else "1"
         free = ", ".join(getattr(result[e.name], "undetermined", ()))
         most = [fixed(v if v > tiny else 0.0) for v, tiny in zip(sizes.get(e.name, ()), least, strict=False)]
-        rows.append((e.name, type(e).__name__, attachment_text(e), at, axis, count, *(most or passed[e.name]), free))
+        rows.append((e.name, type(e).__name__, attachment_text(e), at, axis, count, *(most or passed.get(e.name, ("", ""))), free))
     columns = ("joint", "kind", "between", "at, start [m]", "axis, start", "rows")
     loads = ("largest |force| [N]", "largest |torque| [N m]")
     if not any(r[-1] for r in rows):

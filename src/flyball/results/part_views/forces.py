@@ -18,6 +18,8 @@ from ...laws.interval_evaluation import evaluate_over_time, read_steps, takes_ar
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
+from ...model.joint import Coupling
+from ...model.names import curve_parts
 from ..contacts import ContactHistory
 from ..events import RecordedModes, stored_reference
 from ..motion_record import coordinate_records
@@ -125,7 +127,8 @@ class ForceView(PartView):
         """
         s, own = self._x.structure, self._rows()
         if isinstance(self.element, CoordinateForce) and (other := self.element.measured_with()):
-            return self._result[other]._whole_along  # type: ignore[no-any-return]
+            view = self._result[other]
+            return view._whole_along if isinstance(view, ForceView) else self._held()
         if any(f is self.element for f in s.forces):
             x, rate, effort = self._along()
         elif own:
@@ -136,7 +139,7 @@ class ForceView(PartView):
             m = s.measured.get(e.coordinate_text() or f"{e.name}:length")
             nothing = self._result.motions.zeros() + np.nan
             x, rate = (nothing, nothing) if m is None else self._result.measured.quantity(m)
-            effort = self._result.channel(e.transmitted())[1] if e.transmitted() else nothing
+            effort = self._transmitted() if e.transmitted() else nothing
         side = sign(effort) * (effort != 0.0)
         stretches = self._result.phases
         if own and stretches is not None:
@@ -146,6 +149,21 @@ class ForceView(PartView):
                 effort = effort + self._result.multipliers[:, s.switches[k].row]
                 side = np.where(held, np.where(way == 0.0, 1.0, way), side)
         return x, rate, effort, side + 0.0
+
+    def _transmitted(self) -> np.ndarray:
+        """Return the effort of the part that carries the element's own; at rest a constraint may replace that part."""
+        name = self.element.transmitted()
+        owner = curve_parts(name)[0]
+        if not isinstance(self._result.model[owner], Coupling):
+            return self._result.channel(name)[1]
+        return self._result[f"{owner}.effort_1"] / self._x.numbers[owner].weights[0]
+
+    def _held(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return (length, rate, effort, side) of a rope over pulleys that a constraint keeps taut at rest."""
+        n, zero = self._x.numbers[self.element.name], self._result.motions.zeros()
+        drawn = drawn_rope(self.element, n)
+        length = sum(drawn.lengths) + drawn.arcs(n.radii) if n.length is None else n.length
+        return length + zero, zero, self._transmitted(), 1.0 + zero
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the values of a law over time."""
