@@ -20,6 +20,7 @@ CONTACT = {  # see test_contact_examples
     "silo.py",  # and verification/test_silo
     "tippe_top.py",
     "tracked_vehicle.py",  # verification/test_tracks
+    "tracked_vehicle_in_space.py",  # verification/test_tracks_in_space
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
