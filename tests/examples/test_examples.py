@@ -24,6 +24,7 @@ CONTACT = {  # see test_contact_examples
     "tippe_top.py",
     "tracked_vehicle.py",  # verification/test_tracks
     "wheel_in_gravel.py",
+    "tracked_vehicle_in_space.py",  # verification/test_tracks_in_space
     "woodpecker.py",  # and verification/test_woodpecker
     "wrecking_ball.py",
 }
