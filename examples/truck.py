@@ -102,8 +102,8 @@ def _driveline(m: fb.Mechanism, body, speed: float) -> None:
         m.add(fb.Revolute(f"{name}_bearing", "engine", name, at=(x, 0, 1.0), axis=(1, 0, 0)))
     angles = ("crank_bearing.angle", "output_bearing.angle")
     if speed:
-        m.add(fb.EngineMap("diesel", "crank_bearing", throttle="pedals.throttle", **ENGINE))
         m.add(fb.GearBox("box", *angles, ratios=RATIOS, capacity=1500, gear=gear, up="2200 rpm", down="1000 rpm"))
+        m.add(fb.EngineMap("diesel", "crank_bearing", throttle="pedals.throttle", **ENGINE))
     spins = tuple(f"spin rear {side}.angle" for side in SIDES)
     m.add(fb.Coupler("differential", (angles[1], *spins), weights=(1, -FINAL / 2, -FINAL / 2)))
 

@@ -62,11 +62,11 @@ USES = {
     "JointFriction": 'fb.JointFriction("bearing", "A", radius="20 mm", static=0.2, kinetic=0.15)',
     "Motor": 'fb.Motor("motor", "A", torque="2 - 0.1*rate")',
     "EngineMap": (
-        'fb.EngineMap("engine", "crank", speeds=(500, 1500, 2500), speed_unit="rpm", throttles=(0, 0.5, 1), '
-        'torques=((-60, 300, 500), (-90, 400, 800), (-150, 250, 600)), throttle="driver.throttle", idle="600 rpm")'
+        'fb.EngineMap("engine", "A", speeds=(500, 1500, 2500), speed_unit="rpm", throttles=(0, 0.5, 1), '
+        'torques=((-60, 300, 500), (-90, 400, 800), (-150, 250, 600)), throttle=0.7, idle="600 rpm")'
     ),
     "GearBox": (
-        'fb.GearBox("box", "crank.angle", "shaft.angle", ratios=(5.3, 2.5, 1.4, 1), capacity="1500 N*m", '
+        'fb.GearBox("box", "A.angle", "B.angle", ratios=(5.3, 2.5, 1.4, 1), capacity="1500 N*m", '
         'up="2200 rpm", down="900 rpm")'
     ),
     "Tyre": (
@@ -123,9 +123,9 @@ USES = {
     "GravityCompensatedPD": 'fb.GravityCompensatedPD("pd", coordinates=["A.angle"], reference=["1"], kp=50, kd=10)',
     "Integrator": 'fb.Integrator("sum", of="0.2 - slide.displacement", gain=2)',
     "Lag": 'fb.Lag("valve", of="command", time="20 ms")',
-    "SpeedDriver": 'fb.SpeedDriver("pedals", setpoint="20", measured="car.vx", kp=0.5, ki=0.1)',
+    "SpeedDriver": 'fb.SpeedDriver("pedals", setpoint=20, measured="a.vx", kp=0.5, ki=0.1)',
     "PathDriver": (
-        'fb.PathDriver("steers", "car", path=[(0, 0), (30, 0), (60, 3.5), (90, 3.5), (200, 3.5)], wheelbase=2.7)'
+        'fb.PathDriver("steers", "a", path=[(0, 0), (30, 0), (60, 3.5), (90, 3.5), (200, 3.5)], wheelbase=2.7)'
     ),
     "PID": 'fb.PID("pid", setpoint="0.2", measured="slide.displacement", kp=80, ki=60, kd=12, filter="20 ms")',
     "State": 'fb.State("heat", rate="power - 0.1*heat", initial=0)',

@@ -85,3 +85,34 @@ def test_inverse_dynamics_says_what_to_do():
         fb.ModelError, match=r"Tyre 'rubber', and inverse_dynamics does not support.*forces with states"
     ):
         m.inverse_dynamics([0.0])
+
+
+MAP = {"speeds": (0, 300), "throttles": (0, 1), "torques": ((-10, 100), (-10, 100)), "throttle": 1}
+BOX = {"ratios": (4, 2), "capacity": 500}
+PATH = [(0, 0), (10, 0), (20, 0), (30, 0)]
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        (lambda: fb.EngineMap("e", "a", **(MAP | {"throttles": (0.1, 1)})), "begins at 0, the closed throttle"),
+        (lambda: fb.EngineMap("e", "a", **MAP, idle=100, limit=104), "limit must exceed the idle speed"),
+        (lambda: fb.EngineMap("my engine", "a", **MAP), "give it a name of one word"),
+        (lambda: fb.EngineMap("e", "a", **(MAP | {"torques": ((1, 2),)})), "e_map.*2 rows of 2"),
+        (lambda: fb.GearBox("g", "a.angle", "b.angle", **(BOX | {"ratios": (4,)})), "give two or more"),
+        (lambda: fb.GearBox("g", "a.angle", "b.angle", **BOX, gear=3), "gear is 3; it must be from 0, neutral, to 2"),
+        (lambda: fb.GearBox("g", "a.angle", "b.angle", **BOX, up=100, down=60), "give up more than 2 times down"),
+        (lambda: fb.GearBox("g", "a.angle", "b.angle", **(BOX | {"ratios": (1, 2)}), up=9), "positive and descend"),
+        (lambda: fb.SpeedDriver("d", setpoint=1, measured="a.rate", kp=0, ki=1), "kp is 0"),
+        (lambda: fb.PathDriver("d", "one", path=PATH[:3], wheelbase=2), "four or more points"),
+        (lambda: fb.PathDriver("d", "one", path=[*PATH, (30, 0)], wheelbase=2), "points 4 and 5 of the path are both"),
+        (lambda: fb.PathDriver("d", "other", path=PATH, wheelbase=2), "no body named 'other'"),
+    ],
+)
+def test_refused_parts_of_drivelines(part, message):
+    m = fb.Mechanism("line", planar=True, gravity=(0, 0))
+    for k, (name, joint) in enumerate((("one", "a"), ("two", "b"))):
+        m.add(fb.Body(name, mass=1, inertia=1, position=(k, 0)), fb.Revolute(joint, "ground", name, at=(k, 0)))
+    with pytest.raises(fb.ModelError, match=message):
+        m.add(part())
+    assert not m.forces and not m.controllers and not m.frames and not m.tables

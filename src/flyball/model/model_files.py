@@ -286,9 +286,16 @@ def _add_all(model: Model, entries: list[Entry], definitions: Mapping[str, Any],
             raise errors[0]  # only these can refer to one another
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
-    owned = part_owners(model)  # after their owners; copies of mechanisms are first
+    owned = part_owners(model)
+
+    def order(e: Element) -> tuple[int, bool]:
+        """Place in the file; of a part after its owner, or last in a table in which that is not."""
+        owner = owned.get(e.name, e)
+        found = place.get(owner.name, -1)  # copies of mechanisms are first
+        return (found, owner is not e) if owner.category == e.category else (len(place), True)
+
     for category in AFTER_OTHERS:
-        getattr(model, category).sort(key=lambda e: place.get(e.name, len(place) if e.name in owned else -1))
+        getattr(model, category).sort(key=order)
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:
