@@ -11,7 +11,6 @@ import flyball as fb
 from tests.mechanisms import EXAMPLES
 
 SPACE = runpy.run_path(str(EXAMPLES / "tracked_vehicle_in_space.py"))
-PLANE = runpy.run_path(str(EXAMPLES / "tracked_vehicle.py"))
 G, GAUGE, FRICTION, PITCH, TEETH = 9.81, 1.2, 0.6, 0.15, 11
 STEPS = fb.Stepping(step="5 ms", solver="gauss-seidel", tolerance=5e-3)
 

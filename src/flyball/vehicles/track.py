@@ -22,11 +22,10 @@ from ..model.shapes import Box, Capsule, Cylinder, Prism, Rod, Sphere
 GAP = 0.25  # between the plates of two shoes, as a part of the pitch: room for a tooth
 ARM = 0.2  # mass of an arm, as a part of that of its wheel
 HORN, PLAY, GROUSER = 1.0, 0.3, 0.3  # radius of a guide horn, its play, radius of a grouser, as parts of a thickness
+Given = Any  # a number, a quantity such as "22 cm", or a pair of these; later numbers
 STEEL, RUST, SLATE = "#5b6770", "#a63d2f", "#3a4148"
-UNITS = {
-    "at": "m", "mass": "kg", "radius": "m", "arm": "m", "slide": "", "stiffness": None, "damping": None, "load": "N",
-    "pitch": "m", "thickness": "m", "width": "m", "wheel_width": "m", "friction": "1",
-}  # fmt: skip
+UNITS = dict.fromkeys(("at", "radius", "arm", "pitch", "thickness", "width", "wheel_width"), "m")
+UNITS |= {"mass": "kg", "load": "N", "slide": "1"}
 
 
 @dataclass(frozen=True)
@@ -59,15 +58,15 @@ class TrackWheel:
     """
 
     name: str
-    at: tuple[float, float]
-    mass: float
-    radius: float | None = None
-    teeth: int | None = None
-    arm: tuple[float, float] | None = None
-    slide: tuple[float, float] | None = None
-    stiffness: float | None = None
-    damping: float = 0.0
-    load: float = 0.0
+    at: Given
+    mass: Given
+    radius: Given = None
+    teeth: Given = None
+    arm: Given = None
+    slide: Given = None
+    stiffness: Given = None
+    damping: Given = 0.0
+    load: Given = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a wheel of two kinds, and numbers that are missing or have no effect."""
@@ -80,9 +79,8 @@ class TrackWheel:
         sprung = self.arm is not None or self.slide is not None
         if sprung != (self.stiffness is not None) or (not sprung and (self.damping or self.load)):
             raise ModelError(f"{title}: stiffness belongs to arm or slide, damping and load to stiffness")
-        rotation = self.arm is not None
-        units = UNITS | {"stiffness": "N*m/rad", "damping": "N*m*s/rad"} if rotation else UNITS
-        units = units if rotation else units | {"stiffness": "N/m", "damping": "N*s/m"}
+        spring, damper = ("N/m", "N*s/m") if self.arm is None else ("N*m/rad", "N*m*s/rad")
+        units = UNITS | {"stiffness": spring, "damping": damper}
         for f in ("at", "mass", "radius", "arm", "slide", "stiffness", "damping", "load"):
             if (x := getattr(self, f)) is not None:
                 object.__setattr__(self, f, plain_numbers(x, units[f], f"{f} of {title}"))
@@ -95,7 +93,7 @@ class TrackWheel:
             raise ModelError(f"{title}: damping is {self.damping:g}; it must not be negative")
 
 
-def plain_numbers(x: Any, unit: str | None, where: str) -> Any:
+def plain_numbers(x: Given, unit: str, where: str) -> Any:
     """Return a number, or the two components of a point, in SI units."""
     if not isinstance(x, (list, tuple, np.ndarray)):
         return float(number(x, {}, unit, where))
@@ -104,7 +102,7 @@ def plain_numbers(x: Any, unit: str | None, where: str) -> Any:
     return tuple(float(number(c, {}, unit, where)) for c in x)
 
 
-def whole_number(x: Any, where: str) -> int:
+def whole_number(x: Given, where: str) -> int:
     """Return a count."""
     if float(number(x, {}, "1", where)) % 1.0 != 0.0:
         raise ModelError(f"{where} is {x}; give a whole number")
@@ -122,11 +120,6 @@ class Shoes:
     width: float
     wheel_width: float
 
-    @property
-    def horn(self) -> float:
-        """Radius of a guide horn [m]."""
-        return HORN * self.thickness
-
     def shape(self, spatial: bool) -> tuple:
         """Plate, hinge, and in space two guide horns and a grouser; x along the track, y into it."""
         p, t, w = self.pitch, self.thickness, self.width
@@ -134,7 +127,7 @@ class Shoes:
         hinge = Rod(start=(-p / 2, 0, -w / 2), end=(-p / 2, 0, w / 2), radius=t / 4, looks=True)
         if not spatial:
             return plate, hinge
-        r, g = self.horn, GROUSER * t
+        r, g = HORN * t, GROUSER * t
         side = self.wheel_width / 2 + PLAY * t + r
         horns = (Sphere(radius=r, position=(0, t / 2 + r, z)) for z in (-side, side))
         return plate, hinge, *horns, Capsule(radius=g, length=w - 2 * g, position=(0, -t / 2, 0))
@@ -174,15 +167,15 @@ def track(
     name: str,
     wheels: Sequence[TrackWheel],
     *,
-    shoes: int,
-    pitch: float,
-    thickness: float,
-    mass: float,
-    width: float = 0.3,
-    friction: float = 0.3,
-    damping: float = 0.0,
+    shoes: Given,
+    pitch: Given,
+    thickness: Given,
+    mass: Given,
+    width: Given = 0.3,
+    friction: Given = 0.3,
+    damping: Given = 0.0,
     spatial: bool = False,
-    wheel_width: float | None = None,
+    wheel_width: Given = None,
 ) -> Mechanism:
     """Return a track: shoes, hinged to a closed chain, around wheels on a hull.
 
