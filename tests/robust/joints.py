@@ -147,7 +147,7 @@ SPATIAL = {
     "PointOnCurve": _point_on_curve,
 }
 COUPLINGS = ("GearPair", "RackAndPinion", "Coupler", "Constraint")
-NEW_KINDS = ("FlatFacedCam", "PointOnCurve", "LinearActuator", "Constraint")
+NEW_KINDS = ("FlatFacedCam", "PointOnCurve", "LinearActuator", "RopeSpan", "Constraint")
 """Kinds of the family of curves alone, so that the seeds of other families keep their meaning."""
 
 

@@ -178,3 +178,13 @@ def test_no_force_of_its_own():
         boom(fb.Event("e", "t > 1", do=[fb.Release("C")]))
     with pytest.raises((ModelError, AnalysisError)):
         boom(**LAWS["driven"]).add(fb.Event("e", "t > 1", do=[fb.Lock("C")]))
+
+
+def test_an_actuator_without_length_is_named():
+    """Driven to the point where its ends coincide, it stops the motion by name; a report of such a motion has no loads."""
+    m = fb.Mechanism("slide", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("b", mass=2, inertia=0.1), fb.Prismatic("g", "ground", "b", at=(0, 0), axis=(0, 1)))
+    m.add(fb.LinearActuator("d", "ground", "b", at=((0, -1), (0, 0)), speed=-0.5, limit=1000))
+    with pytest.raises(fb.SimulationError, match="both ends of LinearActuator 'd' are at one point"):
+        m.simulate(3)
+    assert "LinearActuator" in m.simulate(0.5).report()

@@ -253,3 +253,25 @@ def test_a_winch_between_frames_needs_its_length():
     with pytest.raises(ModelError, match="give its free length"):
         m.add(fb.Rope("other", ("top", "hook"), feed="-v*t"))
     m.add(fb.Rope("other", ("top", "hook"), feed="-v*t", length=4))
+
+
+def slide(*more):
+    """A body of 2 kg on a vertical guide."""
+    m = fb.Mechanism("slide", planar=True, gravity=(0, -G))
+    m.add(fb.Body("b", mass=2, inertia=0.1), fb.Prismatic("g", "ground", "b", at=(0, 0), axis=(0, 1)), *more)
+    return m
+
+
+def test_drives_of_given_speed_tell_at_rest_what_they_hold():
+    m = slide(fb.Actuator("d", "g.displacement", speed=0, limit=30))
+    assert m.equilibrium()["d.force"] == pytest.approx(2 * G, rel=1e-9)
+    m = arm(fb.Motor("M", "A", speed=0, limit=30), gravity=G)
+    assert m.equilibrium()["M.torque"] == pytest.approx(2 * G * 0.5, rel=1e-9)
+
+
+def test_limits_of_drives_are_named_as_such():
+    with pytest.raises(ModelError, match="limit of Actuator 'd' is -3 N; it must be zero or greater"):
+        slide(fb.Actuator("d", "g.displacement", speed=0, limit=-3))
+    m = slide(fb.Actuator("d", "g.displacement", speed=0, limit="30*(1 - t)"))
+    with pytest.raises(fb.SimulationError, match=r"the force of Actuator 'd' is no number\. Its limit is"):
+        m.simulate(2)

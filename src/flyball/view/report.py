@@ -264,7 +264,18 @@ def joints(result: Result) -> ReportTable:
         count = str(len(e.rows(p))) if isinstance(e, Joint) else "1"
         free = ", ".join(getattr(result[e.name], "undetermined", ()))
         most = [fixed(v if v > tiny else 0.0) for v, tiny in zip(sizes.get(e.name, ()), least, strict=False)]
-        rows.append((e.name, type(e).__name__, attachment_text(e), at, axis, count, *(most or passed.get(e.name, ("", ""))), free))
+        rows.append(
+            (
+                e.name,
+                type(e).__name__,
+                attachment_text(e),
+                at,
+                axis,
+                count,
+                *(most or passed.get(e.name, ("", ""))),
+                free,
+            )
+        )
     columns = ("joint", "kind", "between", "at, start [m]", "axis, start", "rows")
     loads = ("largest |force| [N]", "largest |torque| [N m]")
     if not any(r[-1] for r in rows):
