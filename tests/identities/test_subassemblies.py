@@ -111,6 +111,7 @@ LATER = {  # elements with parts of their own, or whose texts name coordinates
         "R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), drum="A.angle", radius=0.1, stiffness=100
     ),
     "feed": lambda: fb.Rope("R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), feed="-0.1*t**2"),
+    "pulley": lambda: fb.Rope("R", ["ground", "b"], at=((0.2, 1), (1.5, 0.2)), radii=(0.1, 0), turns=(2, 0)),
 }
 
 
