@@ -57,6 +57,8 @@ class _Numbers:
             kept = 2 if self.planar and len(x) == 3 and x[2] == 0.0 else len(x)
             return (*(self.value(y, field, dimension) for y in x[:kept]), *x[kept:])
         found = number(x, self.env, dimension, field)
+        if field == "Rope.radii" and found == 0.0:  # a point, which is no pulley
+            return x
         parameter = self.names.setdefault(field, f"p{len(self.names)}")
         self.count += 1
         weight = (abs(found) or 0.1) * (1.0 + 0.5 * math.cos(self.count)) * (-1.0) ** self.count

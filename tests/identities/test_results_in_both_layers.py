@@ -57,7 +57,7 @@ def loads(r):
     for f in r.model.forces:
         for what in f.outputs:
             yield f"{f.name}.{what}", getattr(r[f.name], what)
-        if not f.outputs:
+        if not f.outputs and f.acts():
             yield f.name, np.hstack(r[f.name].wrench)
     for k in r.model.couplings:
         for what in k.coupled() if k.name not in r.health.redundant else ():

@@ -32,7 +32,8 @@ def measure_quantities(s: Structure, names_in_use: Mapping[str, Event | Controll
     elements.
     """
     for e in (*s.model.forces, *s.model.limits):
-        if isinstance(e, CoordinateForce):
+        # equations without switching elements lack the limit that measures a rope over pulleys
+        if isinstance(e, CoordinateForce) and s.model.find(e.measured_with() or e.name) is not None:
             _acting_quantity(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
     own = {x.name for x in s.controls}
