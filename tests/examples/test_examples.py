@@ -43,6 +43,7 @@ EVENTS = {  # see test_events: what holds in them changes at instants, or may
     "bouncing_ball.toml",
     "cam_follower.toml",
     "clock_escapement.toml",
+    "crane.toml",
     "gear_backlash.toml",
     "geneva_drive.toml",
     "ratchet.toml",

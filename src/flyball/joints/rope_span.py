@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 from ..constraints.angle import unwrapped
 from ..constraints.blocks import ANGLE, TANGENT
 from ..constraints.tangent import tangent
+from ..errors import ModelError
 from ..math.vec import matrix_product
 from ..model.element import Numbers, PointPair, Unit, element
 from ..model.joint import Coordinate, Joint, WorldFrame
@@ -44,6 +45,12 @@ class RopeSpan(Joint):
     axial: ClassVar[bool] = True
     place_unit: ClassVar[str] = "rad"
     symbol: ClassVar[str] = "rope"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Require two radii."""
+        super().check(n)
+        if len(n.radii) != 2:
+            raise ModelError(f"{self.title}: radii has {len(n.radii)} numbers; give two, of the pulleys at its ends")
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """Return frames with origins at both centres and z along the axis."""
