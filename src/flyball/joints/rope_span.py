@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 from ..constraints.angle import unwrapped
 from ..constraints.blocks import ANGLE, TANGENT
 from ..constraints.tangent import tangent
+from ..errors import ModelError
 from ..math.vec import matrix_product
 from ..model.element import Numbers, PointPair, Unit, element
 from ..model.joint import Coordinate, Joint, WorldFrame
@@ -44,6 +45,16 @@ class RopeSpan(Joint):
     axial: ClassVar[bool] = True
     place_unit: ClassVar[str] = "rad"
     symbol: ClassVar[str] = "rope"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Require two radii, and circles that a line touches."""
+        if len(n.radii) != 2:
+            raise ModelError(f"{self.title}: radii has {len(n.radii)} numbers; give two, 0 for a point")
+        if n.at is None:
+            return
+        distance = sum((x.real - y.real) ** 2 for x, y in zip(*n.at, strict=True)) ** 0.5
+        if text := self.degenerate(n, distance, 0.0):
+            raise ModelError(text)
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """Return frames with origins at both centres and z along the axis."""
