@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flyball.constraints import alignment, skew_lines
+from flyball.constraints import alignment, skew_lines, tangent
 from flyball.constraints import angle as angle_row
 from flyball.constraints.registry import KINDS
 from flyball.testing.formula_checks import complex_step_frame, frame_record, moved_frame, random_motion
@@ -53,7 +53,7 @@ def test_wrench_is_the_gradient_of_the_value(case, seed):
 def test_wrench_is_the_gradient_of_the_value_on_the_constraint(case):
     """Where the row is fulfilled too: it is put there along its own gradient."""
     F, M, hint = frames(case, 1)
-    hint = 0.0 if case[0] == angle_row.KIND else hint
+    hint = 0.0 if case[0] in (angle_row.KIND, tangent.KIND) else hint
     for _ in range(30):
         out = evaluated(case, F, M, hint)
         f, t = np.array(out[1]), np.array(out[2])

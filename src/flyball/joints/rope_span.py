@@ -47,10 +47,14 @@ class RopeSpan(Joint):
     symbol: ClassVar[str] = "rope"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Require two radii."""
-        super().check(n)
+        """Require two radii, and circles that a line touches."""
         if len(n.radii) != 2:
-            raise ModelError(f"{self.title}: radii has {len(n.radii)} numbers; give two, of the pulleys at its ends")
+            raise ModelError(f"{self.title}: radii has {len(n.radii)} numbers; give two, 0 for a point")
+        if n.at is None:
+            return
+        distance = sum((x.real - y.real) ** 2 for x, y in zip(*n.at, strict=True)) ** 0.5
+        if text := self.degenerate(n, distance, 0.0):
+            raise ModelError(text)
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """Return frames with origins at both centres and z along the axis."""
