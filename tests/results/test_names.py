@@ -13,7 +13,20 @@ from flyball.results.part_views.base import NamedQuantities
 from tests.errors.test_new_elements import plane, space
 
 SQUARE = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)]
-ASIDE = {"pulls", "wrench", "element", "instead", "names", "title", "undetermined", "unit", "drift", "work"}
+ASIDE = {
+    "pulls",
+    "wraps",
+    "course",
+    "wrench",
+    "element",
+    "instead",
+    "names",
+    "title",
+    "undetermined",
+    "unit",
+    "drift",
+    "work",
+}
 """Attributes that are no quantity over time, or a pair or list of such; the work of all parts is a dict."""
 
 
