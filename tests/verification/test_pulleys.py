@@ -315,3 +315,21 @@ def test_crane():
     still = moving | (r.t > 6.1)
     assert r["motor.torque"][still] == pytest.approx(0.2 * r["rope.tension"][still], rel=1e-8)
     assert r["rope.wrap_1"] == pytest.approx(6 * np.pi + r["shaft.angle"], abs=1e-8)
+
+
+@pytest.mark.parametrize("rise", [0.5, 2.0])
+def test_a_rope_that_leaves_its_pulley_is_named(rise):
+    """Over the top of a pulley of 0.2 m from (-1, 0) to (1, y): it leaves the pulley where its ends are in one line."""
+    m = fb.Mechanism("lifted", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("hook", mass=1, inertia=0.1, position=(1, -1)))
+    m.add(
+        fb.Prismatic("guide", "ground", "hook", at=(1, -1), axis=(0, 1)),
+        fb.Driver("lift", "guide.displacement", f"{rise}*t"),
+    )
+    at = ((-1, 0), (0, 0), (1, -1))
+    m.add(fb.Rope("rope", ("ground", "ground", "hook"), at=at, radii=(0, -0.2, 0), stiffness=100.0))
+    run = m.simulate(1.0)
+    leaves = -1 + rise * run.t > 2 * np.tan(np.arcsin(0.2))  # the tangent from (-1, 0) rises by arcsin 0.2
+    assert ((run["rope.wrap_2"] < 0) == leaves).all()
+    named = [w for w in run.health.warnings if "it has left the pulley on 'ground' (point 2)" in w]
+    assert len(named) == leaves.any()

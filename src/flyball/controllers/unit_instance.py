@@ -480,7 +480,7 @@ def _callbacks() -> Any:
     made.logger = fmi2.fmi2CallbackLoggerTYPE(_log_2)
     made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    with suppress(Exception):  # without the proxy messages keep their format signs
+    with suppress(ImportError, OSError):  # without the proxy messages keep their format signs
         from fmpy.logging import addLoggerProxy
 
         addLoggerProxy(byref(made))

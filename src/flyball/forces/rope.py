@@ -183,8 +183,8 @@ class Rope(PathForce):
     includes its arcs and the rope on its drums, less the rope paid out by ``feed``.
 
     A wrap below zero means that the rope has left the pulley, which is not modelled: the motion goes on as if the
-    pulley could pull. In space a straight part may leave the plane of its pulley, as a load swings; a pulley
-    swivels with its body only.
+    pulley could pull, and ``health.warnings`` names rope, pulley and time. In space
+    a straight part may leave the plane of its pulley, as a load swings; a pulley swivels with its body only.
     """
 
     stiffness: Stiffness | None = None

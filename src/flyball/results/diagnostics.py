@@ -224,6 +224,25 @@ def lifted_wheel_warnings(result: Result) -> list[str]:
 
 MOST_LIFTS = 3  # intervals in the air that a warning lists
 
+
+def unwrapped_rope_warnings(result: Result) -> list[str]:
+    """Return a warning for each pulley that a rope has left: it would have to push there, which no rope can."""
+    found = []
+    ropes: list[Any] = result.model.forces
+    for e in (x for x in ropes if getattr(x, "radii", None)):
+        for k, (wrap, r) in enumerate(zip(result[e.name].wraps, result.values.numbers[e.name].radii, strict=True)):
+            apart = wrap < -LEFT_PULLEY
+            if r != 0.0 and apart.any():
+                found.append(
+                    f"{e.title}: it has left the pulley on {e.bodies[k]!r} (point {k + 1}) at t = "
+                    f"{result.t[int(np.argmax(apart))]:.4g} s, where its wrap is below zero; from there on the motion "
+                    "is wrong, because the pulley pulls it. Let the rope begin with more turns, or end the motion before"
+                )
+    return found
+
+
+LEFT_PULLEY = 1e-6  # [rad] of negative wrap that is rounding
+
 APPROACH_GROWTH = 2.0  # growth of the fastest velocity over the times that are examined
 APPROACH_FIT = 0.05  # allowed deviation of 1 / v^2 from a line, relative to its first value
 APPROACH_OUTPUTS = 5  # least number of output times among them
@@ -433,6 +452,7 @@ def motion_warnings(result: Result) -> tuple[str, ...]:
         *transverse_slip_warnings(result),
         *tyre_warnings(result),
         *lifted_wheel_warnings(result),
+        *unwrapped_rope_warnings(result),
         *singular_passage_warnings(result),
         lock_up_warning(result),
         *pull_warnings(result),
