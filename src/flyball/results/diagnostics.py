@@ -236,7 +236,7 @@ def unwrapped_rope_warnings(result: Result) -> list[str]:
                 found.append(
                     f"{e.title}: it has left the pulley on {e.bodies[k]!r} (point {k + 1}) at t = "
                     f"{result.t[int(np.argmax(apart))]:.4g} s, where its wrap is below zero; from there on the motion "
-                    "is wrong, because the pulley pulls it. Let the rope begin with more turns, or end the motion before"
+                    "is wrong, because the pulley pulls it. Give the rope more turns, or end the motion before"
                 )
     return found
 
