@@ -47,6 +47,7 @@ from ..tables.structure_definition import velocity_names
 
 CLOSED_GAP = 1e-12  # gap of rows of unit norm [rad, or relative to the mechanism's length] that counts as closed
 VANISHING_STIFFNESS = 1e-14  # stiffness along a velocity below this part of the largest energy is rounding
+BALANCED_PART = 1e-6  # forces are balanced by positions if no larger part of them is left
 STATE_RANGE = 100.0  # natural size of a step of a controller state, in large changes: steps are limited in length
 
 
@@ -129,19 +130,40 @@ class RestState:
         if not len(self.z):
             return sp.diags(self.weight) @ K @ sp.diags(self.scale)
         K = sp.bmat([[K, e.by_state[e.at["r"]]], [-e.by_position[e.at["s"]], -e.state_jacobian]]).tocsr()
-        K = sp.diags(self.weight) @ K @ sp.diags(self.scale)
-        kept = np.r_[np.zeros(len(self.c.sizes)), self.undetermined_states]
+        K = (sp.diags(self.weight) @ K @ sp.diags(self.scale)).tocsr()
+        kept = np.r_[np.zeros(len(self.c.sizes)), self._kept_states(K)]
         return (K + sp.diags(kept * np.abs(K.data).max(initial=1e-300))).tocsr()
 
     @cached_property
     def undetermined_states(self) -> np.ndarray:
-        """Which unknown controller states have no rate near here, whatever the position: they keep their values, bool.
+        """Which unknown controller states have no rate near here, whatever the position, bool.
 
-        Examples are the force of a friction element and an integrator whose input is zero.
+        Examples are the force of a friction element, the deflection of a standing tyre, and an integrator whose input
+        is zero.
         """
         e = self.equations
         rows = abs(e.by_position[e.at["s"]]).sum(axis=1).A1 + np.abs(e.state_jacobian).sum(axis=1)
         return np.asarray(rows == 0.0)[: len(self.z)]
+
+    def _kept_states(self, K) -> np.ndarray:
+        """Which undetermined states keep their values, bool: positions can balance the forces of such a state.
+
+        The friction of a rubber mount keeps its force, as the mount's spring carries what is missing. The deflection
+        of a tyre is what holds a parked car on a slope, and no position can: it is an unknown.
+        """
+        import scipy.sparse as sp
+
+        kept = self.undetermined_states.copy()
+        if not kept.any():
+            return kept
+        nv = len(self.c.sizes)
+        G = self.G[:, :nv]
+        A = sp.bmat([[K[:nv, :nv], -G.T * np.abs(K.data).max(initial=1e-300)], [G, None]]).tocsr()
+        for k in np.flatnonzero(kept):
+            b = np.r_[K[:nv, nv + k].toarray().ravel(), np.zeros(len(self.g))]
+            left = b - A @ minimum_norm_solution(A, b)
+            kept[k] = np.abs(left).max(initial=0.0) <= BALANCED_PART * np.abs(b).max(initial=0.0)
+        return kept
 
     @cached_property
     def r(self) -> np.ndarray:

@@ -429,7 +429,7 @@ class TurnElimination:
             return self.graph.number(x.value)
         if x.op == ADD:
             found = _unwrapped(*args) or _unwrapped(args[1], args[0])
-            if found is not None:
+            if found is not None and found[1].moving:  # an angle nearest to a constant one counts no turns
                 theta, near = found
                 lost = any(s.index in self._unknown for s in nodes_in_order([near]))
                 return theta if lost else near

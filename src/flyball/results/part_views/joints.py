@@ -67,7 +67,7 @@ class JointView(PartView):
     def _found(self, name: str) -> np.ndarray:
         """Return a coordinate by name, or its derivatives with ``_rate`` and ``_acceleration`` appended."""
         if name == "place":
-            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
+            return curve_places(self._result, self.element)
         if name.endswith("_effort"):
             return self.lock_effort(name.removesuffix("_effort"))
         k = next((k for k, ending in enumerate(DERIVATIVE_ENDINGS) if k and name.endswith(ending)), 0)
