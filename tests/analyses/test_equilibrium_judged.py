@@ -79,6 +79,23 @@ def test_a_straight_chain_hangs_as_it_is_drawn():
     assert chain(3000).modes(count=2).omega == pytest.approx(jn_zeros(0, 2) / 2 * np.sqrt(G), rel=1e-4)
 
 
+@pytest.mark.parametrize(("part", "stability"), [(0.99, "stable"), (1.01, "unstable")])
+def test_a_column_of_many_links_buckles_at_henckys_load(part, stability):
+    """P l = 2 k (1 - cos(pi / (2 n + 1))), clamped below, free above (Hencky 1920); more unknowns than dense ones."""
+    n, k = 150, 3.0
+    m = fb.Mechanism("column", planar=True)
+    for i in range(n):
+        m.add(fb.Body(f"b{i}", mass=1, inertia=0.1, position=(0, i + 0.5)))
+        m.add(fb.Revolute(f"J{i}", f"b{i - 1}" if i else "ground", f"b{i}", at=(0, i)))
+        m.add(fb.TorsionalSpringDamper(f"s{i}", joint=f"J{i}", stiffness=k, damping=1.0))
+    load = part * 2.0 * k * (1.0 - np.cos(np.pi / (2 * n + 1)))
+    m.add(fb.PointForce("load", f"b{n - 1}", at=(0, n), force=("0", f"-{float(load)!r}")))
+    found = m.equilibrium()
+    assert found.stability == stability
+    assert len(found.freedoms) == len(found.stiffness) == n
+    assert (found.least > 0.0) == (stability == "stable")
+
+
 def test_forces_that_cancel_but_for_rounding():
     """0.1 + 0.2 - 0.3 is 5.6e-17."""
     m = fb.Mechanism("block", planar=True)

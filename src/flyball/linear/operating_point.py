@@ -231,9 +231,8 @@ def _equilibrium_at(at: Assembly) -> Equilibrium:
     """Wrap an assembly in an `Equilibrium` of which only the position is used."""
     none: Any = None
     return Equilibrium(
-        t=at.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
-        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at,
-        speeds=motion_speed(at),
+        t=at.t, stability=NOT_JUDGED, unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none,
+        assembly=at, speeds=motion_speed(at),
     )  # fmt: skip
 
 

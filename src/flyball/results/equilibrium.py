@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +60,16 @@ BY_EIGENVALUES, BY_MULTIPLIERS = "eigenvalues of the closed loop", "multipliers 
 MAX_CONTACTS = 12  # number of contacts in a text
 
 
+@dataclass(frozen=True)
+class FreeStiffness:
+    """Stiffness of the motions that the constraints allow; for its fields see `Equilibrium`."""
+
+    freedoms: tuple[str, ...] = ()
+    stiffness: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    weakest: dict[str, float] = field(default_factory=dict)
+    least: float = math.nan
+
+
 @dataclass
 class Equilibrium:
     """A mechanism at rest under its forces, or in steady motion.
@@ -103,10 +115,6 @@ class Equilibrium:
 
     t: float
     stability: str
-    freedoms: tuple[str, ...]
-    stiffness: np.ndarray
-    weakest: dict[str, float]
-    least: float
     unbalanced: float
     method: str
     parameters: dict[str, float]
@@ -118,6 +126,31 @@ class Equilibrium:
     judged_by: str = ""
     touching: tuple[Touch, ...] = ()
     notes: tuple[str, ...] = ()
+    free_stiffness: Callable[[], FreeStiffness] = field(default=FreeStiffness, repr=False)  # dense, and slow if large
+
+    @cached_property
+    def _free(self) -> FreeStiffness:
+        return self.free_stiffness()
+
+    @property
+    def freedoms(self) -> tuple[str, ...]:
+        """Coordinates of the stiffness."""
+        return self._free.freedoms
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness matrix (f, f)."""
+        return self._free.stiffness
+
+    @property
+    def weakest(self) -> dict[str, float]:
+        """Direction of lowest stiffness: coordinate -> component."""
+        return self._free.weakest
+
+    @property
+    def least(self) -> float:
+        """Lowest stiffness relative to the largest force term."""
+        return self._free.least
 
     def __getitem__(self, name: str) -> Any:
         """Return a curve's value, or a part of the result."""

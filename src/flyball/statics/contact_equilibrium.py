@@ -348,8 +348,7 @@ def _contact_equilibrium_result(
     if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_OPEN) for k in touches) and kind != "unstable":
         kind = MARGINAL
     own = smooth_result or Equilibrium(
-        t=x.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
-        unbalanced=0.0, method="", parameters={}, result=result, assembly=None,
+        t=x.t, stability=NOT_JUDGED, unbalanced=0.0, method="", parameters={}, result=result, assembly=None,
     )  # fmt: skip
     return replace(
         own,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..model.contact import has_switching_elements
 from ..model.element_laws import with_inputs
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_switching_with_controllers
-from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium
+from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium, FreeStiffness
 from ..results.result import Result
 from ..results.wording import STABLE, UNSTABLE
 from ..simulation.diagnosis import refuse_contradicting_limits
@@ -43,7 +44,7 @@ from .equilibrium_search import (
     search_failure,
 )
 from .equilibrium_search import find_steady_motion as turn
-from .stability import RestState, stability, stability_by_eigenvalues
+from .stability import RestState, is_unstable, stability_by_eigenvalues
 
 SCALING_PASSES = 4  # searches, each with scales taken at the end of the previous one
 SINGULAR_STIFFNESS = 1e-8  # singular values below this part of the largest count as zero
@@ -324,11 +325,11 @@ def _searched_equilibrium(x: RestState, stable: bool) -> Equilibrium:
         arrived = newton_search(x)
     except SingularityError as error:  # descent may lead elsewhere
         shaky = error
-    unstable = arrived is not None and stability(arrived).kind == UNSTABLE
+    unstable = arrived is not None and is_unstable(arrived)
     if arrived is not None and unstable and not stable and _differ_by_long_step(x, arrived):
         downhill = pseudo_transient_descent(x)  # Newton's method has moved away from the guess, against the forces
         below = None if downhill is None else newton_search(downhill)
-        if below is not None and stability(below).kind != UNSTABLE:
+        if below is not None and not is_unstable(below):
             return equilibrium_result(below, {}, "descent")
     if arrived is None or (stable and unstable):
         way = "descent"
@@ -357,16 +358,13 @@ def _steady_motion(a: Assembly, described: Assembly, names: Sequence[str]) -> Eq
     return Equilibrium(
         t=x.t,
         stability=UNSTABLE if grows else STABLE,
-        freedoms=tuple(f.labels),
-        stiffness=r.K if r.K is not None else np.zeros((0, 0)),
-        weakest={},
-        least=float("nan"),
         unbalanced=found.unbalanced,
         method="Newton's method",
         parameters=dict(c.parameters),
         result=snapshot(x),
         assembly=Assembly(c, x.t, q, v),
         speeds=found.speeds,
+        free_stiffness=partial(FreeStiffness, tuple(f.labels), r.K if r.K is not None else np.zeros((0, 0))),
     )
 
 

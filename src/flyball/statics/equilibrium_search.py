@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -37,13 +38,14 @@ from ..model.joint import Joint
 from ..model.messages import listing, suggest
 from ..model.names import curve_parts
 from ..numerics.rank import clearly_independent
-from ..results.equilibrium import Equilibrium
+from ..results.equilibrium import Equilibrium, FreeStiffness
 from ..simulation.initial_state import choose_coordinates
 from ..tables.forest import coordinate_row
 from ..tables.structure_definition import Structure, velocity_names
 from .stability import RestState, stability
 
-REPORTED_COORDINATES = 6  # reported coordinates of the direction of lowest stiffness
+# Coordinates of the direction of lowest stiffness that are reported: how many, and the smallest component.
+REPORTED_COORDINATES, REPORTED_COMPONENT = 6, 1e-3
 
 
 def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> Equilibrium:
@@ -58,16 +60,10 @@ def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> 
         Name of the search method.
     """
     s = stability(x)
-    names = velocity_names(x.c.structure)
-    large = np.argsort(-np.abs(s.direction))[:REPORTED_COORDINATES]
     x.c.at(x.t, x.q, np.zeros(len(x.scale)))
     return Equilibrium(
         t=x.t,
         stability=s.kind,
-        freedoms=tuple(s.free.labels),
-        stiffness=s.stiffness,
-        weakest={names[d].name: float(s.direction[d]) for d in large if abs(s.direction[d]) > 1e-3},
-        least=s.least,
         unbalanced=x.unbalanced(),
         method=method,
         parameters=dict(x.c.parameters),
@@ -75,7 +71,17 @@ def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> 
         assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
         preload=preload,
         kinks=s.kinks,
+        free_stiffness=partial(_free_stiffness, x),
     )
+
+
+def _free_stiffness(x: RestState) -> FreeStiffness:
+    """Stiffness of the free motions at an equilibrium, and the largest components of its weakest direction."""
+    s = stability(x).softest
+    names = velocity_names(x.c.structure)
+    large = np.argsort(-np.abs(s.direction))[:REPORTED_COORDINATES]
+    weakest = {names[d].name: float(s.direction[d]) for d in large if abs(s.direction[d]) > REPORTED_COMPONENT}
+    return FreeStiffness(tuple(s.free.labels), s.stiffness, weakest, s.least)
 
 
 NEWTON_STEPS, DESCENT_STEPS = 40, 400  # largest numbers of steps
@@ -170,7 +176,7 @@ def perturbed_along_softest(x: RestState, changed: RestState | None = None) -> R
     NotConverged
         If the mechanism has no free motion.
     """
-    direction = stability(x).direction
+    direction = stability(x).softest.direction
     largest = np.abs(direction).max(initial=0.0)
     if not largest:
         raise search_failure(changed or x)

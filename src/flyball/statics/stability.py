@@ -40,7 +40,7 @@ from ..derivatives.linearized_equations import (
 from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points
 from ..engine.kinematics import retract
 from ..errors import AnalysisError
-from ..numerics.rank import null_space
+from ..numerics.rank import negative_pivots, null_space
 from ..results.modes import largest_growth
 from ..results.wording import MARGINAL, STABLE, UNSTABLE
 from ..tables.structure_definition import velocity_names
@@ -457,13 +457,11 @@ NEGATIVE_DAMPING = 1e-12  # negative damping below this part of the largest is r
 
 
 @dataclass
-class Stability:
-    """Stability of an equilibrium, with the direction of lowest stiffness.
+class SoftestMotion:
+    """Stiffness of the free motions, and the direction in which it is lowest.
 
     Attributes
     ----------
-    kind : str
-        ``"stable"``, ``"marginal"`` or ``"unstable"``.
     free : FreeCoordinates
     stiffness : ndarray (f, f)
         Stiffness of the free motions; at a kink that of the side with the lowest one.
@@ -471,16 +469,50 @@ class Stability:
         Direction of lowest stiffness, in scaled velocities.
     least : float
         Lowest stiffness relative to the separate contributions of springs, weights and reactions.
-    kinks : tuple of str
-        Descriptions of forces with a kink at this position.
     """
 
-    kind: str
     free: FreeCoordinates
     stiffness: np.ndarray
     direction: np.ndarray
     least: float
+
+    @classmethod
+    def of(cls, f: FreeCoordinates, s: ConstrainedStiffness) -> SoftestMotion:
+        """The direction of lowest stiffness among the principal ones."""
+        k = int(np.argmin(s.parts))
+        return cls(f, s.matrix, s.along[:, k], float(s.parts[k]))
+
+    @classmethod
+    def none(cls, f: FreeCoordinates) -> SoftestMotion:
+        """No motion is free."""
+        return cls(f, np.zeros((0, 0)), np.zeros(len(f.scale)), np.inf)
+
+
+@dataclass
+class Stability:
+    """Stability of an equilibrium.
+
+    Attributes
+    ----------
+    kind : str
+        ``"stable"``, ``"marginal"`` or ``"unstable"``.
+    kinks : tuple of str
+        Descriptions of forces with a kink at this position.
+    known : SoftestMotion or RestState
+        The softest motion, or the state where it is computed on demand.
+    """
+
+    kind: str
+    known: SoftestMotion | RestState
     kinks: tuple[str, ...] = ()
+
+    @cached_property
+    def softest(self) -> SoftestMotion:
+        """The stiffness of the free motions with its softest direction: dense matrices."""
+        if isinstance(self.known, SoftestMotion):
+            return self.known
+        f = free_coordinates(self.known.equations)
+        return SoftestMotion.of(f, constrained_stiffness(self.known, f)) if f.Zv.shape[1] else SoftestMotion.none(f)
 
 
 def stability(x: RestState) -> Stability:
@@ -492,34 +524,71 @@ def stability(x: RestState) -> Stability:
         If a force jumps there, or stability does not follow from the sides of its kinks.
     """
     if x.known_stability is None:
-        x.known_stability = _computed_stability(x)
+        stable = _sign_of_stiffness(x) > 0 and not _may_have_negative_damping(x)
+        x.known_stability = Stability(STABLE, x) if stable else _computed_stability(x)
     return x.known_stability
+
+
+def is_unstable(x: RestState) -> bool:
+    """Whether an equilibrium is unstable; that of a large mechanism may be decided without its `stability`."""
+    return (x.known_stability is None and _sign_of_stiffness(x) < 0) or stability(x).kind == UNSTABLE
+
+
+CONSTRAINT_PENALTY = 1e6  # factor of G^T G beside the largest stiffness
+
+
+def _sign_of_stiffness(x: RestState) -> int:
+    """Sign of the stiffness of a large mechanism: 1 positive definite, -1 not semidefinite, 0 not decided.
+
+    With c > 0, K + c G^T G is positive definite only if K is so along the motions that the rows G allow; for a large c
+    the converse holds (Finsler 1937). Pivots of the sparse matrix have the signs of its eigenvalues.
+    """
+    import scipy.sparse as sp
+
+    K, n = x.K, len(x.scale)
+    if n <= DENSE_UNKNOWNS or len(x.z) or abs(K - K.T).max() > NEUTRAL_STIFFNESS * x.size:
+        return 0
+    if nonsmooth_points(x.equations):
+        return 0
+    A = 0.5 * (K + K.T) + CONSTRAINT_PENALTY * x.size * x.G.T @ x.G
+    margin = NEUTRAL_STIFFNESS * x.size * sp.identity(n)
+    return 1 if not negative_pivots(A - margin) else -1 if negative_pivots(A + margin) else 0
+
+
+def _may_have_negative_damping(x: RestState) -> bool:
+    """Whether velocity-dependent forces may add energy to a motion: their matrix has a negative pivot."""
+    import scipy.sparse as sp
+
+    e = x.equations
+    D = e.by_velocity[e.at["r"]]
+    D = D + D.T
+    most = abs(D).max()
+    return bool(most) and negative_pivots(D + NEGATIVE_DAMPING * most * sp.identity(D.shape[0])) > 0
 
 
 def _computed_stability(x: RestState) -> Stability:
     e = x.equations
     f = free_coordinates(e)
     if not f.Zv.shape[1]:
-        return Stability(STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf)
+        return Stability(STABLE, SoftestMotion.none(f))
     still = 0.0 * f.Zv
     states = [k.name for k in x.c.structure.model.controllers]  # keep their values
     points = [k for k in nonsmooth_points(e) if k.element not in states]
     found = [k for k in points if k.is_crossed_by(f.Zv * f.scale[f.chosen_v], still)]
     if found:
         kind, s = one_sided_stability(x, f, found)
-        k = int(np.argmin(s.parts))
-        texts = tuple(dict.fromkeys(k.text for k in found))
-        return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]), texts)
+        return Stability(kind, SoftestMotion.of(f, s), tuple(dict.fromkeys(k.text for k in found)))
     s = constrained_stiffness(x, f)
-    k = int(np.argmin(s.parts))
-    kind = UNSTABLE if s.parts[k] < -NEUTRAL_STIFFNESS else MARGINAL if s.parts[k] <= NEUTRAL_STIFFNESS else STABLE
+    softest = SoftestMotion.of(f, s)
+    least = softest.least
+    kind = UNSTABLE if least < -NEUTRAL_STIFFNESS else MARGINAL if least <= NEUTRAL_STIFFNESS else STABLE
     if not s.potential:  # flutter follows from the eigenvalues only
         if moved := [k for k in points if k.is_crossed_by(still, f.Zv)]:
             raise nonsmooth_error(moved, x.t, "there are no linear equations")
         kind = _stability_by_motion(e, f)
     elif kind == STABLE and _has_negative_damping(e, f) and _stability_by_motion(e, f) == UNSTABLE:
         kind = UNSTABLE
-    return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
+    return Stability(kind, softest)
 
 
 def _has_negative_damping(e: EquationDerivatives, f: FreeCoordinates) -> bool:
