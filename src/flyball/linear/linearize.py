@@ -32,7 +32,7 @@ from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
 from ..errors import ModelError
-from ..model.contact import has_switching_elements
+from ..model.contact import has_switching_elements, holds_or_touches
 from ..model.controller import Controller, Sensor
 from ..model.element_laws import Input, with_inputs
 from ..model.model import Model
@@ -58,8 +58,6 @@ from .descriptor import (
 from .operating_point import SizeTest, contact_operating_point, operating_state
 from .sampling_cycle import SampledSignal, cycle_equations, refuse_unsettled
 
-# For `refuse_switching_with_controllers`.
-SMALL_MOTIONS, JOINTS_INSTEAD = "small motions know", "put joints in its place"
 FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts as none
 
 
@@ -102,14 +100,12 @@ class LinearizeOptions(OperatingPointOptions):
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     refuse_cumulative_outputs(model, o.outputs)
-    if model.with_states():
-        return controlled_linear_model(model, o)[0]
-    if has_switching_elements(model):
-        joined, there, notes = contact_operating_point(model, o, "linearize")
-        out = _smooth_linear_model(joined, there)
-        out.notes = notes
-        return out
-    return _smooth_linear_model(model, o)
+    notes: tuple[str, ...] = ()
+    if holds_or_touches(model) or (has_switching_elements(model) and not model.with_states()):
+        model, o, notes = contact_operating_point(model, o, "linearize")
+    out = controlled_linear_model(model, o)[0] if model.with_states() else _smooth_linear_model(model, o)
+    out.notes = (*notes, *out.notes)
+    return out
 
 
 def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
@@ -138,7 +134,7 @@ def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearMo
 
     With sampled controllers they are difference equations over one cycle.
     """
-    refuse_switching_with_controllers(model, SMALL_MOTIONS, JOINTS_INSTEAD)
+    refuse_switching_with_controllers(model)
     given, o = o.outputs, replace(o, outputs=tuple(_signal_name(model, name) for name in o.outputs))
     for name in o.outputs:
         single_quantity(model, name)

@@ -12,14 +12,14 @@ from ..derivatives.eigenvalues import EQUAL_TOLERANCE, Spectrum, spectrum
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.linearized_equations import TurningFrame
 from ..derivatives.output_derivatives import snapshot
-from ..model.contact import has_switching_elements
+from ..model.contact import has_switching_elements, holds_or_touches
 from ..model.model import Model
-from ..model.unsupported_elements import refuse_sampled_controllers, refuse_switching_with_controllers
+from ..model.unsupported_elements import refuse_sampled_controllers
 from ..numerics.rank import column_space
 from ..results.modes import Modes, is_growing
 from ..tables.structure_definition import velocity_names
 from .descriptor import DENSE_FREEDOMS, DENSE_VELOCITIES, SparseEquations, exceeds_dense_size, uses_sparse_equations
-from .linearize import JOINTS_INSTEAD, SMALL_MOTIONS, OperatingPointOptions, equations_without_inputs
+from .linearize import OperatingPointOptions, equations_without_inputs
 from .operating_point import contact_operating_point
 
 DEFAULT_COUNT = 10
@@ -48,10 +48,8 @@ class ModesOptions(OperatingPointOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Compute the modes about an equilibrium or a steady motion: see `Mechanism.modes`."""
-    if model.with_states():
-        refuse_sampled_controllers(model, "modes")
-        refuse_switching_with_controllers(model, SMALL_MOTIONS, JOINTS_INSTEAD)
-    elif has_switching_elements(model):
+    refuse_sampled_controllers(model, "modes")
+    if holds_or_touches(model) or (has_switching_elements(model) and not model.with_states()):
         joined, there, notes = contact_operating_point(model, o, "modes")
         return replace(_smooth_modes(joined, there), notes=notes)
     return _smooth_modes(model, o)

@@ -90,19 +90,20 @@ def refuse_controllers(model: Model, analysis: str) -> None:
         )
 
 
-def refuse_switching_with_controllers(model: Model, analysis: str, instead: str) -> None:
+def refuse_switching_with_controllers(model: Model) -> None:
     """Refuse controllers beside contacts, stops, friction and the like.
 
     Raises
     ------
     ModelError
-        If the mechanism has both; ``instead`` is what can be done besides leaving out what switches.
+        If the mechanism has both.
     """
     if model.with_states() and holds_or_touches(model):
         titles = ", ".join(e.title for e in model.with_states()[:3])
         raise ModelError(
-            f"{model.name!r} has {titles} and parts that hold at times, and {analysis} supports one of the two; leave "
-            f"what holds out, m.changed({{...: None}}), or {instead}"
+            f"{model.name!r} has {titles} and parts that hold at times; this analysis supports one of the two, and "
+            "equilibrium, linearize and modes support both. Leave what holds out, m.changed({...: None}), or put "
+            "joints in its place"
         )
 
 

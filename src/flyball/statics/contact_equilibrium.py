@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,9 +45,11 @@ from .closed_contacts import ContactState, SupportForces, contact_table, find_cl
 from .equilibrium_search import equilibrium_result, newton_search
 from .replacement_joints import (
     ActiveConstraints,
+    active_constraints,
     missing_joints_text,
     model_with_contact_joints,
     model_without_contacts,
+    stops_beyond,
     support_with_friction,
 )
 from .stability import RestState
@@ -216,6 +218,7 @@ HoldingParts = tuple[ActiveConstraints, Mapping[str, float]]
 """Active constraints besides contacts, and the capacity of each sticking part."""
 # Largest correction of the settled position by Newton's method [rad, or relative to the mechanism's length].
 CORRECTION_LIMIT = 0.02
+SETTLING_METHOD = "impulse time stepping"
 REST_BALANCE = 1e-6  # largest residual of a state at rest, relative to the applied forces
 
 
@@ -251,6 +254,88 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
             {},
         )
     return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))
+
+
+@dataclass(frozen=True)
+class ClosedContactModel:
+    """A mechanism at a position with its closed contacts, and the models in which joints replace them.
+
+    Attributes
+    ----------
+    model : Model
+        With its contacts and switching elements.
+    place : ContactState
+    bare : Model
+        Without contacts; constraints stand for the active switching elements.
+    held : ActiveConstraints
+        These constraints.
+    joined : Model
+        The same with closed contacts as joints.
+    """
+
+    model: Model
+    place: ContactState
+    bare: Model
+    held: ActiveConstraints
+    joined: Model
+
+
+def closed_contact_model(model: Model, at: Assembly) -> ClosedContactModel:
+    """The models in which joints and constraints replace what touches and holds at a position.
+
+    Raises
+    ------
+    ModelError
+        If the model has bulk material or events, or no joint is equivalent to a closed contact.
+    """
+    refuse_bulk_and_events(model, "equilibrium")
+    model = model.snapshot()
+    place = find_closed_contacts(model, at)
+    bare, held = model_without_contacts(model, at)
+    joined, missing = model_with_contact_joints(bare, place)
+    if missing:
+        raise ModelError(
+            f"an equilibrium with controllers needs a joint in place of every closed contact: "
+            f"{missing_joints_text(missing)}"
+        )
+    return ClosedContactModel(model, place, bare, held, joined)
+
+
+def closed_contact_equilibrium(
+    closed: ClosedContactModel, smooth: Equilibrium, parameters: Mapping[str, float] | None
+) -> Equilibrium:
+    """Equilibrium with contacts from that of the model with joints in place of them.
+
+    Raises
+    ------
+    NotConverged
+        If other contacts are closed there, or if contacts and stops would have to pull, or to slide.
+    """
+    model, own, at = closed.model, closed.place.at.compiled, smooth.assembly
+    still = np.zeros(own.structure.nv)
+    moved = Assembly(own, at.t, own.take(at.compiled, at.t, at.q, 0.0 * at.v)[0], still)
+    place = find_closed_contacts(model, moved)
+    beyond = set(stops_beyond(model, moved))
+    before, now = (
+        {*(c.name for c in p.contacts), *(e.name for e in held.parts)}
+        for p, held in ((closed.place, closed.held), (place, active_constraints(model, moved)))
+    )
+    remedy = "describe it nearer to its position of rest, or give start= a motion at whose end it rests"
+    if before != now | beyond:
+        raise NotConverged(
+            f"{model.name!r} has no equilibrium with the contacts and stops that are closed where the search starts: "
+            f"{', '.join(sorted(before ^ (now | beyond)))} would open or close; {remedy}",
+            {},
+        )
+    x = _rest_state(closed.bare, place, parameters)
+    found, bears = support_with_friction(model, place, x, closed.held)
+    if found.unbalanced > REST_BALANCE:
+        raise NotConverged(
+            f"{model.name!r} does not rest with {', '.join(sorted(now))} closed: they would have to pull, or to carry "
+            f"more friction than they can; {remedy}",
+            {},
+        )
+    return _contact_equilibrium_result(x, place, found, smooth, "", (closed.held, bears))
 
 
 def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> ContactState:
@@ -354,7 +439,7 @@ def _contact_equilibrium_result(
         own,
         stability=kind,
         unbalanced=found.unbalanced,
-        method="impulse time stepping" + (", then Newton's method" if smooth_result else ""),
+        method=SETTLING_METHOD if smooth_result is None else own.method or f"{SETTLING_METHOD}, then Newton's method",
         parameters=dict(c.parameters),
         result=result,
         assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),

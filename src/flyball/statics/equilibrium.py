@@ -22,17 +22,16 @@ from ..derivatives.equation_derivatives import EquationDerivatives, MechanismSta
 from ..derivatives.linearized_equations import free_coordinates
 from ..derivatives.output_derivatives import snapshot
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
-from ..model.contact import has_switching_elements
+from ..model.contact import has_switching_elements, holds_or_touches
 from ..model.element_laws import with_inputs
 from ..model.model import Model
-from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium, FreeStiffness
 from ..results.result import Result
 from ..results.wording import STABLE, UNSTABLE
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..simulation.initial_state import find_initial_state as begin_motion
 from ..tables.structure_definition import velocity_names
-from .contact_equilibrium import contact_equilibrium
+from .contact_equilibrium import closed_contact_equilibrium, closed_contact_model, contact_equilibrium
 from .equilibrium_search import (
     LONGEST_STEP,
     equilibrium_result,
@@ -265,14 +264,31 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     for name in ("stable", "preload", "turning"):
         if getattr(o, name):
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
-    refuse_switching_with_controllers(model, "equilibrium knows", "simulate until it rests")
     a = assemble(model, t=o.t, parameters=o.parameters)
     _refuse_speeds(a)
-    guess, c = _initial_guess(model, o), a.compiled
+    guess = _initial_guess(model, o)
     begin = _search_start(a, guess)
-    z = (guess or begin).compiled.z[: len(c.structure.controls)].copy()
-    q, way = controlled_rest(model.snapshot(), c, a.t, begin.q, z)
-    out = equilibrium_result(RestState.at(c, a.t, q), {}, way)
+    begin.compiled.follow((guess or begin).compiled.hints)
+    if not holds_or_touches(model):
+        out = _rest_of_closed_loop(model.snapshot(), begin)
+        return _with_eigenvalue_stability(model, out)
+    closed = closed_contact_model(model, begin)
+    c = compile_mechanism(closed.joined, parameters=o.parameters)
+    q, v = c.take(begin.compiled, a.t, begin.q, begin.v)
+    smooth = _with_eigenvalue_stability(closed.joined, _rest_of_closed_loop(closed.joined, Assembly(c, a.t, q, v)))
+    return closed_contact_equilibrium(closed, smooth, o.parameters)
+
+
+def _rest_of_closed_loop(model: Model, begin: Assembly) -> Equilibrium:
+    """Positions and controller states at rest."""
+    c = begin.compiled
+    z = c.z[: len(c.structure.controls)].copy()
+    q, way = controlled_rest(model, c, begin.t, begin.q, z)
+    return equilibrium_result(RestState.at(c, begin.t, q), {}, way)
+
+
+def _with_eigenvalue_stability(model: Model, out: Equilibrium) -> Equilibrium:
+    """The equilibrium with its stability by the eigenvalues of the closed loop."""
     from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear imports statics
 
     linear, out.stability = controlled_linear_model(model, LinearizeOptions(about=out, **LINEARIZE_DEFAULTS))

@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
+from ..constraints.switches.stop import STOP
 from ..constraints.switches.switch_kind import INTERVAL, NO_ROW, STATIC, SwitchKind
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
@@ -184,26 +185,52 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         If an active element has no equivalent constraint, or a user-defined kind does not say whether it holds.
     """
     out = ActiveConstraints()
-    parts = [e for e in unsupported_elements(model) if e.switches()]
-    if not parts:
-        return out
+    for x in _switch_states(model, at):
+        e, kind = x.element, x.switch.kind
+        _refuse_undecided(e, kind)
+        sign = kind.push_direction(x.value, x.bounds, x.near)
+        if sign is not None:
+            out.parts.append(holding_constraint(e, x.switch, x.values, x.value))
+            out.signs[e.name] = sign
+            if kind.forces == INTERVAL and e.acts():
+                out.friction_elements[e.name] = e
+            elif kind.forces == INTERVAL:
+                out.strengths[e.name] = x.strength
+    return out
+
+
+def stops_beyond(model: Model, at: Assembly) -> list[str]:
+    """Names of the stops, plays and ropes that are beyond a bound at a position."""
+    stops = [x for x in _switch_states(model, at) if x.switch.kind is STOP]
+    return [x.element.name for x in stops if not x.bounds[0] - x.near <= x.value <= x.bounds[1] + x.near]
+
+
+class _SwitchState(NamedTuple):
+    """A switch at rest at a position: its element, the measured value, its bounds, and what is near to these."""
+
+    element: Any
+    switch: Switch
+    values: Values
+    value: float
+    bounds: tuple[float, float]
+    near: float
+    strength: float
+
+
+def _switch_states(model: Model, at: Assembly) -> list[_SwitchState]:
+    """All switches of a model at a position."""
+    if not any(e.switches() for e in unsupported_elements(model)):
+        return []
     c = compile_mechanism(model, parameters=at.compiled.parameters, switches=True)
     q, v = c.take(at.compiled, at.t, at.q, 0.0 * at.v)
     c.at(at.t, q, v)
-    S = c.values.system
+    n = c.values.system.switch_numbers
+    out = []
     for k, x in enumerate(c.structure.switches):
-        _refuse_undecided(x.element, x.switch.kind)
         value = float(c.work.sensed.value[x.measured])
-        size = 1.0 if _is_rotation(model, x.element, x.switch) else c.values.length
-        lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
-        sign = x.switch.kind.push_direction(value, (lower, upper), CLOSED_GAP * size)
-        if sign is not None:
-            out.parts.append(holding_constraint(x.element, x.switch, c.values, value))
-            out.signs[x.element.name] = sign
-            if x.switch.kind.forces == INTERVAL and x.element.acts():
-                out.friction_elements[x.element.name] = x.element
-            elif x.switch.kind.forces == INTERVAL:
-                out.strengths[x.element.name] = float(S.switch_numbers.strength[k])
+        near = CLOSED_GAP * (1.0 if _is_rotation(model, x.element, x.switch) else c.values.length)
+        bounds = float(n.lower[k]), float(n.upper[k])
+        out.append(_SwitchState(x.element, x.switch, c.values, value, bounds, near, float(n.strength[k])))
     return out
 
 
