@@ -690,8 +690,8 @@ class StaticsMethods(Model):
 
         Drivers hold their coordinates at the values for ``t``; velocities, dampers and inertia have no effect at rest.
         A mechanism with contact is simulated from the reference configuration until it is at rest; ``stable``,
-        ``preload`` and ``turning`` do not apply then. With controllers it is not: the contacts and stops that are closed
-        in the reference configuration, or at the end of the motion ``start``, stay closed.
+        ``preload`` and ``turning`` do not apply then. With controllers it is not: contacts and stops that are closed in
+        the reference configuration, or at the end of the motion ``start``, stay closed.
 
         Parameters
         ----------
