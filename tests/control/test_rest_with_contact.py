@@ -115,3 +115,20 @@ def test_equations_along_a_motion_with_a_closed_brake():
     for value in own:
         assert np.abs(found - value).min() < 1e-5
     assert len(found) == 3  # and the controller's filter
+
+
+def test_a_rest_found_from_the_end_of_a_motion_is_exact():
+    """A link falls through the play of its coupling to a sprung one: -c b = m g l cos a, and b - a = gap / 2."""
+    m = fb.Mechanism("play", planar=True, gravity=(0, -G))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+    m.add(fb.Body("b", mass=1, inertia=0.1, position=(2, 0)), fb.Revolute("B", "ground", "b", at=(2, 0)))
+    m.add(fb.TorsionalSpringDamper("s", joint="B", stiffness=50, damping=5.0))
+    m.add(fb.Backlash("g", ("A.angle", "B.angle"), gap=0.1))
+    with pytest.raises(fb.NotConverged, match="g would open or close"):
+        m.equilibrium()
+    rest = m.equilibrium(start=m.simulate(10.0))
+    assert 50 * rest["B.angle"] == pytest.approx(-G * 0.5 * np.cos(rest["A.angle"]), rel=1e-9)
+    (g,) = rest.touching
+    assert abs(rest["A.angle"] - rest["B.angle"]) == pytest.approx(0.05, abs=1e-12)
+    assert abs(g.normal) == pytest.approx(G * 0.5 * np.cos(rest["A.angle"]), rel=1e-9)
+    assert rest.stability == "stable"

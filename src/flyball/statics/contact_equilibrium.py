@@ -7,8 +7,8 @@ oscillation then settles within a few swings, and what sticks never moves. Time 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -219,11 +219,18 @@ HoldingParts = tuple[ActiveConstraints, Mapping[str, float]]
 # Largest correction of the settled position by Newton's method [rad, or relative to the mechanism's length].
 CORRECTION_LIMIT = 0.02
 SETTLING_METHOD = "impulse time stepping"
+START_REMEDY = "describe it nearer to its position of rest, or give start= a motion at whose end it rests"
+Search = Callable[[Model, Assembly], Equilibrium]
 REST_BALANCE = 1e-6  # largest residual of a state at rest, relative to the applied forces
 
 
-def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> Equilibrium:
+def contact_equilibrium(
+    model: Model, begin: Assembly, parameters: Mapping[str, float] | None, search: Search
+) -> Equilibrium:
     """Find where a mechanism comes to rest, and the forces that carry it there.
+
+    It rests as described, or where impulse steps lead it; with elements that these do not support, where ``search``
+    finds a balance of forces with the contacts and stops that are closed as described.
 
     Parameters
     ----------
@@ -232,6 +239,8 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
     begin : Assembly
         The initial position.
     parameters : mapping, optional
+    search : callable
+        Finds an equilibrium of a smooth model near an assembly.
 
     Raises
     ------
@@ -243,6 +252,8 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
     refuse_bulk_and_events(model, "equilibrium")
     model = model.snapshot()
     place = _rest_contacts(model, begin, parameters)
+    if place is None:
+        return closed_contact_equilibrium(model, begin, parameters, search)
     bare, held = model_without_contacts(model, place.at)
     place, judged, missing = _stability_with_joints(model, bare, place, parameters)
     x = _rest_state(bare, place, parameters)
@@ -256,108 +267,72 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
     return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))
 
 
-@dataclass(frozen=True)
-class ClosedContactModel:
-    """A mechanism at a position with its closed contacts, and the models in which joints replace them.
-
-    Attributes
-    ----------
-    model : Model
-        With its contacts and switching elements.
-    place : ContactState
-    bare : Model
-        Without contacts; constraints stand for the active switching elements.
-    held : ActiveConstraints
-        These constraints.
-    joined : Model
-        The same with closed contacts as joints.
-    """
-
-    model: Model
-    place: ContactState
-    bare: Model
-    held: ActiveConstraints
-    joined: Model
-
-
-def closed_contact_model(model: Model, at: Assembly) -> ClosedContactModel:
-    """The models in which joints and constraints replace what touches and holds at a position.
+def closed_contact_equilibrium(
+    model: Model, begin: Assembly, parameters: Mapping[str, float] | None, search: Search
+) -> Equilibrium:
+    """Equilibrium with the contacts and stops that are closed at the initial position; for the arguments see above.
 
     Raises
     ------
     ModelError
         If the model has bulk material or events, or no joint is equivalent to a closed contact.
+    NotConverged
+        If other contacts or stops are closed at the equilibrium, or if they would have to pull or to slide.
     """
     refuse_bulk_and_events(model, "equilibrium")
     model = model.snapshot()
-    place = find_closed_contacts(model, at)
-    bare, held = model_without_contacts(model, at)
+    place = find_closed_contacts(model, begin)
+    bare, held = model_without_contacts(model, begin)
     joined, missing = model_with_contact_joints(bare, place)
     if missing:
         raise ModelError(
-            f"an equilibrium with controllers needs a joint in place of every closed contact: "
+            f"{model.name!r} has elements whose equilibrium needs a joint in place of every closed contact: "
             f"{missing_joints_text(missing)}"
         )
-    return ClosedContactModel(model, place, bare, held, joined)
+    c = compile_mechanism(joined, parameters=parameters)
+    q, v = c.take(begin.compiled, begin.t, begin.q, 0.0 * begin.v)
+    smooth = search(joined, Assembly(c, begin.t, q, v))
+    place = _with_the_same_contacts(model, place, held, smooth.assembly)
+    x = _rest_state(bare, place, parameters)
+    found, bears = support_with_friction(model, place, x, held)
+    if found.unbalanced > REST_BALANCE:
+        names = ", ".join([c.name for c in place.contacts] + [e.name for e in held.parts])
+        raise NotConverged(
+            f"{model.name!r} does not rest with {names} closed: they would have to pull, or to carry more friction "
+            f"than they can; {START_REMEDY}",
+            {},
+        )
+    return _contact_equilibrium_result(x, place, found, smooth, "", (held, bears))
 
 
-def closed_contact_equilibrium(
-    closed: ClosedContactModel, smooth: Equilibrium, parameters: Mapping[str, float] | None
-) -> Equilibrium:
-    """Equilibrium with contacts from that of the model with joints in place of them.
-
-    Raises
-    ------
-    NotConverged
-        If other contacts are closed there, or if contacts and stops would have to pull, or to slide.
-    """
-    model, own, at = closed.model, closed.place.at.compiled, smooth.assembly
-    still = np.zeros(own.structure.nv)
-    moved = Assembly(own, at.t, own.take(at.compiled, at.t, at.q, 0.0 * at.v)[0], still)
-    place = find_closed_contacts(model, moved)
-    beyond = set(stops_beyond(model, moved))
-    before, now = (
-        {*(c.name for c in p.contacts), *(e.name for e in held.parts)}
-        for p, held in ((closed.place, closed.held), (place, active_constraints(model, moved)))
-    )
-    remedy = "describe it nearer to its position of rest, or give start= a motion at whose end it rests"
-    if before != now | beyond:
+def _with_the_same_contacts(model: Model, place: ContactState, held: ActiveConstraints, at: Assembly) -> ContactState:
+    """The contacts at an assembly of the model with joints; refused if others are closed than in ``place``."""
+    own = place.at.compiled
+    moved = Assembly(own, at.t, own.take(at.compiled, at.t, at.q, 0.0 * at.v)[0], np.zeros(own.structure.nv))
+    there = find_closed_contacts(model, moved)
+    before = {*(c.name for c in place.contacts), *(e.name for e in held.parts)}
+    now = {*(c.name for c in there.contacts), *(e.name for e in active_constraints(model, moved).parts)}
+    if changed := before ^ now.union(stops_beyond(model, moved)):
         raise NotConverged(
             f"{model.name!r} has no equilibrium with the contacts and stops that are closed where the search starts: "
-            f"{', '.join(sorted(before ^ (now | beyond)))} would open or close; {remedy}",
+            f"{', '.join(sorted(changed))} would open or close; {START_REMEDY}",
             {},
         )
-    x = _rest_state(closed.bare, place, parameters)
-    found, bears = support_with_friction(model, place, x, closed.held)
-    if found.unbalanced > REST_BALANCE:
-        raise NotConverged(
-            f"{model.name!r} does not rest with {', '.join(sorted(now))} closed: they would have to pull, or to carry "
-            f"more friction than they can; {remedy}",
-            {},
-        )
-    return _contact_equilibrium_result(x, place, found, smooth, "", (closed.held, bears))
+    return there
 
 
-def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> ContactState:
+def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> ContactState | None:
     """Contacts at the position of rest: as described if forces balance there, else found by impulse steps.
 
-    Raises
-    ------
-    NotConverged
-        If it does not rest as described and has parts that impulse stepping does not support.
+    None if it does not rest as described and has parts that impulse stepping does not support.
     """
     place = find_closed_contacts(model, begin)
     bare, held = model_without_contacts(model, place.at)
     left = support_with_friction(model, place, _rest_state(bare, place, parameters), held)[0].unbalanced
     if left <= REST_BALANCE:
         return place
-    if unknown := not_for_impulse_stepping(model):
-        raise NotConverged(
-            f"{model.name!r} is not in equilibrium in the reference configuration: {left:.2g} of the forces is left "
-            "unbalanced. The position of rest is found by impulse time stepping, which does not support "
-            f"{', '.join(e.title for e in unknown)}: describe it in its position of rest, or simulate it with damping",
-            {},
-        )
+    if not_for_impulse_stepping(model):
+        return None
     return find_closed_contacts(model, settled_assembly(model, begin, parameters))
 
 

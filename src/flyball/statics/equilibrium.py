@@ -31,7 +31,7 @@ from ..results.wording import STABLE, UNSTABLE
 from ..simulation.diagnosis import refuse_contradicting_limits
 from ..simulation.initial_state import find_initial_state as begin_motion
 from ..tables.structure_definition import velocity_names
-from .contact_equilibrium import closed_contact_equilibrium, closed_contact_model, contact_equilibrium
+from .contact_equilibrium import closed_contact_equilibrium, contact_equilibrium
 from .equilibrium_search import (
     LONGEST_STEP,
     equilibrium_result,
@@ -240,7 +240,7 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     begin = _search_start(a, _initial_guess(model, o))
     if has_switching_elements(model):
         _refuse_with_contact(o)
-        return contact_equilibrium(model, begin, o.parameters)
+        return contact_equilibrium(model, begin, o.parameters, _rest_of_smooth_model)
     if o.turning:
         return _steady_motion(begin, a, o.turning)
     if o.preload:
@@ -269,31 +269,27 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     guess = _initial_guess(model, o)
     begin = _search_start(a, guess)
     begin.compiled.follow((guess or begin).compiled.hints)
-    if not holds_or_touches(model):
-        out = _rest_of_closed_loop(model.snapshot(), begin)
-        return _with_eigenvalue_stability(model, out)
-    closed = closed_contact_model(model, begin)
-    c = compile_mechanism(closed.joined, parameters=o.parameters)
-    q, v = c.take(begin.compiled, a.t, begin.q, begin.v)
-    smooth = _with_eigenvalue_stability(closed.joined, _rest_of_closed_loop(closed.joined, Assembly(c, a.t, q, v)))
-    return closed_contact_equilibrium(closed, smooth, o.parameters)
+    if holds_or_touches(model):
+        return closed_contact_equilibrium(model, begin, o.parameters, _rest_of_closed_loop)
+    return _rest_of_closed_loop(model.snapshot(), begin)
 
 
 def _rest_of_closed_loop(model: Model, begin: Assembly) -> Equilibrium:
-    """Positions and controller states at rest."""
+    """Positions and controller states at rest, with the stability by the eigenvalues of the closed loop."""
+    from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear imports statics
+
     c = begin.compiled
     z = c.z[: len(c.structure.controls)].copy()
     q, way = controlled_rest(model, c, begin.t, begin.q, z)
-    return equilibrium_result(RestState.at(c, begin.t, q), {}, way)
-
-
-def _with_eigenvalue_stability(model: Model, out: Equilibrium) -> Equilibrium:
-    """The equilibrium with its stability by the eigenvalues of the closed loop."""
-    from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear imports statics
-
+    out = equilibrium_result(RestState.at(c, begin.t, q), {}, way)
     linear, out.stability = controlled_linear_model(model, LinearizeOptions(about=out, **LINEARIZE_DEFAULTS))
     out.judged_by = BY_MULTIPLIERS if linear.period else BY_EIGENVALUES
     return out
+
+
+def _rest_of_smooth_model(model: Model, begin: Assembly) -> Equilibrium:
+    """Equilibrium of a model without controllers and switching elements."""
+    return _searched_equilibrium(RestState.at(begin.compiled, begin.t, begin.q), stable=False)
 
 
 def _refuse_with_contact(o: EquilibriumOptions) -> None:
