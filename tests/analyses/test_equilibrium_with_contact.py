@@ -131,7 +131,7 @@ def test_stops_of_forces_and_of_torques_are_compared_in_any_unit_of_length(lengt
     found = {k.name: k for k in m.equilibrium().touching}
     assert found["buffer"].normal == pytest.approx(G * length)
     assert found["stop"].normal == pytest.approx(1e-4 * G * 0.5 * length**2)
-    assert {k.state for k in found.values()} == {"smooth"}
+    assert {k.state for k in found.values()} == {"closed"}
 
 
 def test_a_wedge_locks_itself() -> None:

@@ -20,27 +20,30 @@ if TYPE_CHECKING:
 
 
 STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_OPEN = "sticks", "smooth", "at its friction limit", "about to open"
+CLOSED = "closed"
 
 
 @dataclass(frozen=True)
 class Touch:
-    """A closed contact, or an active stop, of a mechanism at rest.
+    """A closed contact, an active stop, or a brake or joint friction that sticks, of a mechanism at rest.
 
     Attributes
     ----------
     name : str
         ``"block-floor"``, with a number if there are several; of a stop its own name.
     state : str
-        ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, on the verge of sliding; or ``"about
-        to part"``, without load.
-    normal : float
-        Normal force [N]; of a stop its effort [N or N m]; of joint friction, a brake or clutch its capacity.
-    tangential : float [N]
+        ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, on the verge of sliding; ``"closed"``,
+        a stop, play, rope or latch that carries a force; or ``"about to open"``, without load.
+    normal : float [`unit`]
+        Normal force; of a stop its effort; of joint friction, a brake or clutch its capacity.
+    tangential : float [`unit`]
         Friction force.
     used : float
         Friction force relative to the friction limit; 0 without friction.
     gap : float [m]
         Distance of the surfaces; below 0 they overlap.
+    unit : str
+        ``"N"``, or ``"N*m"`` of what acts along an angle.
     """
 
     name: str
@@ -49,11 +52,16 @@ class Touch:
     tangential: float = 0.0
     used: float = 0.0
     gap: float = 0.0
+    unit: str = "N"
+    capacity: bool = False  # whether ``normal`` is a capacity
 
     def __str__(self) -> str:
-        part = f"{100.0 * self.used:.3g} % of its largest force"
-        friction = f", friction {self.tangential:.4g} N, {part}" if self.used else ""
-        return f"{self.name} {self.state}, presses with {self.normal:.4g}{friction}"
+        unit = self.unit.replace("*", " ")
+        part = f", {100.0 * self.used:.3g} % of its largest force" if self.used else ""
+        if self.capacity or self.state == CLOSED:
+            return f"{self.name} {self.state}, carries {self.tangential or self.normal:.4g} {unit}{part}"
+        friction = f", friction {self.tangential:.4g} {unit}" if self.used else ""
+        return f"{self.name} {self.state}, presses with {self.normal:.4g} {unit}{friction}{part}"
 
 
 BY_EIGENVALUES, BY_MULTIPLIERS = "eigenvalues of the closed loop", "multipliers of the closed loop, sample by sample"

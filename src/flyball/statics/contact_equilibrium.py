@@ -21,7 +21,7 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.contact import not_for_impulse_stepping
 from ..model.model import Model
 from ..model.names import curve_parts
-from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, FRICTIONLESS, STICKS, Equilibrium, Touch
+from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, CLOSED, FRICTIONLESS, STICKS, Equilibrium, Touch
 from ..results.wording import MARGINAL, NOT_JUDGED
 from ..simulation.impulse_stepping.impulse_simulation import OutputRecorder, free_coordinates
 from ..simulation.impulse_stepping.impulse_stepper import ImpulseStepper, NoSolution
@@ -446,10 +446,11 @@ def touch_states(
         out.append(Touch(c.name, state, float(f[0]), slides, used, c.gap))
     for name, bound in bears.items():
         used = abs(lam[name]) / bound if bound > 0.0 else 0.0
-        out.append(Touch(name, AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS, bound, abs(lam[name]), used))
+        state = AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS
+        out.append(Touch(name, state, bound, abs(lam[name]), used, unit=held.units[name], capacity=True))
     for name, effort in stops.items():
         opens = held.signs[name] and lever[name] * effort <= NOTHING * heaviest
-        out.append(Touch(name, ABOUT_TO_OPEN if opens else FRICTIONLESS, effort))
+        out.append(Touch(name, ABOUT_TO_OPEN if opens else CLOSED, effort, unit=held.units[name]))
     return tuple(out)
 
 

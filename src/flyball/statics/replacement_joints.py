@@ -168,12 +168,15 @@ class ActiveConstraints:
         Active friction elements whose limit follows from a law: name -> element.
     strengths : dict
         Largest forces of other elements that hold either way up to a limit: name -> number.
+    units : dict
+        Name -> unit of its effort, ``"N"`` or ``"N*m"``.
     """
 
     parts: list[Element] = field(default_factory=list)
     signs: dict[str, float] = field(default_factory=dict)
     friction_elements: dict[str, Element] = field(default_factory=dict)
     strengths: dict[str, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
@@ -191,7 +194,7 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         sign = kind.push_direction(x.value, x.bounds, x.near)
         if sign is not None:
             out.parts.append(holding_constraint(e, x.switch, x.values, x.value))
-            out.signs[e.name] = sign
+            out.signs[e.name], out.units[e.name] = sign, x.unit
             if kind.forces == INTERVAL and e.acts():
                 out.friction_elements[e.name] = e
             elif kind.forces == INTERVAL:
@@ -215,6 +218,7 @@ class _SwitchState(NamedTuple):
     bounds: tuple[float, float]
     near: float
     strength: float
+    unit: str  # of its effort
 
 
 def _switch_states(model: Model, at: Assembly) -> list[_SwitchState]:
@@ -228,9 +232,10 @@ def _switch_states(model: Model, at: Assembly) -> list[_SwitchState]:
     out = []
     for k, x in enumerate(c.structure.switches):
         value = float(c.work.sensed.value[x.measured])
-        near = CLOSED_GAP * (1.0 if _is_rotation(model, x.element, x.switch) else c.values.length)
+        turns = _is_rotation(model, x.element, x.switch)
+        near, unit = (CLOSED_GAP, "N*m") if turns else (CLOSED_GAP * c.values.length, "N")
         bounds = float(n.lower[k]), float(n.upper[k])
-        out.append(_SwitchState(x.element, x.switch, c.values, value, bounds, near, float(n.strength[k])))
+        out.append(_SwitchState(x.element, x.switch, c.values, value, bounds, near, float(n.strength[k]), unit))
     return out
 
 
