@@ -16,6 +16,9 @@ PASSED_THROUGH = (
 )
 
 
+DRIVEN_REMEDY = "or a Motor in place of a Driver that moves a body against another: no contact force can stop a Driver"
+
+
 @dataclass(frozen=True)
 class ContactHealth:
     """Figures of contact over a whole run.
@@ -107,7 +110,7 @@ class ContactHealth:
             out.append(
                 f"bodies overlap by up to {self.worst_overlap:.2g} m, more than half of the smallest body "
                 f"({self.size:.2g} m), and may have passed through each other: take shorter steps, "
-                f"method=fb.Stepping(step=...)"
+                f"method=fb.Stepping(step=...), {DRIVEN_REMEDY}"
             )
         return tuple(out)
 
@@ -131,7 +134,9 @@ class ContactHealth:
             )
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
             part = f"{100.0 * self.worst_overlap / self.size:.3g} per cent of the smallest body"
-            out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")
+            out.append(
+                f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps, {DRIVEN_REMEDY}"
+            )
         if self.size > 0.0 and self.overlap_at_start > 1e-3 * self.size:
             out.append(
                 f"bodies overlap by {self.overlap_at_start:.2g} m in the reference configuration; they are pushed "
