@@ -134,6 +134,7 @@ class Equilibrium:
     judged_by: str = ""
     touching: tuple[Touch, ...] = ()
     notes: tuple[str, ...] = ()
+    switch_curves: dict[str, float] = field(default_factory=dict, repr=False)  # of stops, ropes, latches, brakes
     free_stiffness: Callable[[], FreeStiffness] = field(default=FreeStiffness, repr=False)  # dense, and slow if large
 
     @cached_property
@@ -162,6 +163,8 @@ class Equilibrium:
 
     def __getitem__(self, name: str) -> Any:
         """Return a curve's value, or a part of the result."""
+        if name in self.switch_curves:
+            return self.switch_curves[name]
         found = self.result[name]
         if not isinstance(found, np.ndarray):
             return found

@@ -51,6 +51,7 @@ from .replacement_joints import (
     model_without_contacts,
     stops_beyond,
     support_with_friction,
+    switches_at_rest,
 )
 from .stability import RestState
 
@@ -264,7 +265,7 @@ def contact_equilibrium(
             "forces unbalanced; start nearer to its position of rest",
             {},
         )
-    return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))
+    return _contact_equilibrium_result(model, x, place, found, judged, missing, (held, bears))
 
 
 def closed_contact_equilibrium(
@@ -302,7 +303,7 @@ def closed_contact_equilibrium(
             f"than they can; {START_REMEDY}",
             {},
         )
-    return _contact_equilibrium_result(x, place, found, smooth, "", (held, bears))
+    return _contact_equilibrium_result(model, x, place, found, smooth, "", (held, bears))
 
 
 def _with_the_same_contacts(model: Model, place: ContactState, held: ActiveConstraints, at: Assembly) -> ContactState:
@@ -392,6 +393,7 @@ def _stability_with_joints(
 
 
 def _contact_equilibrium_result(
+    model: Model,
     x: RestState,
     place: ContactState,
     found: SupportForces,
@@ -420,6 +422,7 @@ def _contact_equilibrium_result(
         assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),
         touching=touches,
         notes=notes,
+        switch_curves=_switch_curves(model, place, x, found.lam, held[0]),
     )
 
 
@@ -447,11 +450,27 @@ def touch_states(
     for name, bound in bears.items():
         used = abs(lam[name]) / bound if bound > 0.0 else 0.0
         state = AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS
-        out.append(Touch(name, state, bound, abs(lam[name]), used, unit=held.units[name], capacity=True))
+        lead = abs(held.leads[name])
+        out.append(Touch(name, state, bound / lead, abs(lam[name]) / lead, used, unit=held.units[name], capacity=True))
     for name, effort in stops.items():
         opens = held.signs[name] and lever[name] * effort <= NOTHING * heaviest
-        out.append(Touch(name, ABOUT_TO_OPEN if opens else CLOSED, effort, unit=held.units[name]))
+        out.append(
+            Touch(name, ABOUT_TO_OPEN if opens else CLOSED, effort / abs(held.leads[name]), unit=held.units[name])
+        )
     return tuple(out)
+
+
+def _switch_curves(model: Model, place: ContactState, x: RestState, lam: np.ndarray, held: ActiveConstraints) -> dict:
+    """Curves of stops, ropes, latches and brakes at rest, by name."""
+    out: dict[str, float] = {}
+    for k in switches_at_rest(model, place.at):
+        name = k.element.name
+        effort, side = 0.0, 0.0
+        if name in held.signs:
+            lead = held.leads[name]
+            effort, side = float(lam[x.c.structure.slices[name]].sum()) / lead, np.sign(lead) * held.signs[name] or 1.0
+        out |= k.curves(effort, side)
+    return out
 
 
 def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing: str) -> tuple[str, ...]:

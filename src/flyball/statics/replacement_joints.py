@@ -162,17 +162,21 @@ class ActiveConstraints:
     ----------
     parts : tuple of Element
         Constraints in place of the active elements, with the names of these elements.
+    leads : dict
+        Name -> weight of the first coordinate in the quantity that it holds. The multiplier of its row is the effort
+        along the quantity times this weight, as the row's first weight is 1.
     signs : dict
-        Name -> +1 if it can only push its quantity up, -1 only down, 0 both.
+        Name -> +1 if its multiplier can only be positive, -1 only negative, 0 both.
     friction_elements : dict
         Active friction elements whose limit follows from a law: name -> element.
     strengths : dict
-        Largest forces of other elements that hold either way up to a limit: name -> number.
+        Largest efforts of other elements that hold either way up to a limit: name -> number.
     units : dict
         Name -> unit of its effort, ``"N"`` or ``"N*m"``.
     """
 
     parts: list[Element] = field(default_factory=list)
+    leads: dict[str, float] = field(default_factory=dict)
     signs: dict[str, float] = field(default_factory=dict)
     friction_elements: dict[str, Element] = field(default_factory=dict)
     strengths: dict[str, float] = field(default_factory=dict)
@@ -188,13 +192,16 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         If an active element has no equivalent constraint, or a user-defined kind does not say whether it holds.
     """
     out = ActiveConstraints()
-    for x in _switch_states(model, at):
+    for x in switches_at_rest(model, at):
         e, kind = x.element, x.switch.kind
         _refuse_undecided(e, kind)
         sign = kind.push_direction(x.value, x.bounds, x.near)
         if sign is not None:
-            out.parts.append(holding_constraint(e, x.switch, x.values, x.value))
-            out.signs[e.name], out.units[e.name] = sign, x.unit
+            part = holding_constraint(e, x.switch, x.values, x.value)
+            lead = float(part.weights[0]) if isinstance(part, HeldCoordinate) else 1.0
+            out.parts.append(part)
+            out.leads[e.name], out.units[e.name] = lead, x.unit
+            out.signs[e.name] = sign * float(np.sign(lead))
             if kind.forces == INTERVAL and e.acts():
                 out.friction_elements[e.name] = e
             elif kind.forces == INTERVAL:
@@ -204,11 +211,11 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
 
 def stops_beyond(model: Model, at: Assembly) -> list[str]:
     """Names of the stops, plays and ropes that are beyond a bound at a position."""
-    stops = [x for x in _switch_states(model, at) if x.switch.kind is STOP]
+    stops = [x for x in switches_at_rest(model, at) if x.switch.kind is STOP]
     return [x.element.name for x in stops if not x.bounds[0] - x.near <= x.value <= x.bounds[1] + x.near]
 
 
-class _SwitchState(NamedTuple):
+class SwitchAtRest(NamedTuple):
     """A switch at rest at a position: its element, the measured value, its bounds, and what is near to these."""
 
     element: Any
@@ -220,8 +227,19 @@ class _SwitchState(NamedTuple):
     strength: float
     unit: str  # of its effort
 
+    def curves(self, effort: float, side: float) -> dict[str, float]:
+        """Values of the element's curves at rest, by name, for the effort of its constraint.
 
-def _switch_states(model: Model, at: Assembly) -> list[_SwitchState]:
+        ``side`` is 1 or -1 where it holds on a side, 0 where it is open.
+        """
+        e = self.element
+        seen = e.outward(self.values.numbers[e.name])
+        side = abs(side) if "taut" in e.outputs else side
+        found = zip(e.outputs, (seen * self.value, 0.0, e.sign * seen * effort, side), strict=False)
+        return {f"{e.name}.{what}": x + 0.0 for what, x in found}
+
+
+def switches_at_rest(model: Model, at: Assembly) -> list[SwitchAtRest]:
     """All switches of a model at a position."""
     if not any(e.switches() for e in unsupported_elements(model)):
         return []
@@ -235,7 +253,7 @@ def _switch_states(model: Model, at: Assembly) -> list[_SwitchState]:
         turns = _is_rotation(model, x.element, x.switch)
         near, unit = (CLOSED_GAP, "N*m") if turns else (CLOSED_GAP * c.values.length, "N")
         bounds = float(n.lower[k]), float(n.upper[k])
-        out.append(_SwitchState(x.element, x.switch, c.values, value, bounds, near, float(n.strength[k]), unit))
+        out.append(SwitchAtRest(x.element, x.switch, c.values, value, bounds, near, float(n.strength[k]), unit))
     return out
 
 
@@ -294,18 +312,17 @@ def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[st
 def support_with_friction(
     model: Model, place: ContactState, x: RestState, held: ActiveConstraints
 ) -> tuple[SupportForces, dict[str, float]]:
-    """Forces that carry a mechanism at rest, and the capacity of each sticking element under these loads."""
+    """Forces that carry a mechanism at rest, and the capacity of each sticking element under these loads.
+
+    Capacities are those of the multipliers.
+    """
     found, bears = support_forces(place, x, held.signs), dict[str, float]()
     for _ in range(FRICTION_ITERATIONS):
         result = snapshot(MechanismState.resting(x.c, x.t, x.q, found.lam))
-        before, bears = (
-            bears,
-            held.strengths
-            | {
-                k: friction_capacity(model, place.at, e, _joint_reactions(result))
-                for k, e in held.friction_elements.items()
-            },
-        )
+        reaction = _joint_reactions(result)
+        capacity = {k: friction_capacity(model, place.at, e, reaction) for k, e in held.friction_elements.items()}
+        capacity |= held.strengths
+        before, bears = bears, {k: most * abs(held.leads[k]) for k, most in capacity.items()}
         if all(abs(b - before.get(k, np.inf)) <= FRICTION_TOLERANCE * b for k, b in bears.items()):
             break
         found = support_forces(place, x, held.signs, bears)
