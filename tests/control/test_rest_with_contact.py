@@ -132,3 +132,15 @@ def test_a_rest_found_from_the_end_of_a_motion_is_exact():
     assert abs(rest["A.angle"] - rest["B.angle"]) == pytest.approx(0.05, abs=1e-12)
     assert abs(g.normal) == pytest.approx(G * 0.5 * np.cos(rest["A.angle"]), rel=1e-9)
     assert rest.stability == "stable"
+
+
+def test_events_that_change_nothing_at_rest_are_left_out():
+    m = standing()
+    m.add(fb.Event("lost", "leg.y < 0.2", do=[fb.Set("pid.integral", 0.0), fb.Stop()]))
+    rest = m.equilibrium()
+    assert rest["ankle.angle"] == pytest.approx(0.05, abs=1e-9)
+    assert "Event 'lost': left out" in rest.notes
+    assert "Event 'lost': left out" in m.linearize(about=rest).notes
+    m.add(fb.Event("locks", "leg.y < 0.3", do=[fb.Lock("ankle")]))
+    with pytest.raises(fb.ModelError, match="Event 'locks'"):
+        m.equilibrium()

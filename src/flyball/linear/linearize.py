@@ -38,7 +38,6 @@ from ..model.element_laws import Input, with_inputs
 from ..model.model import Model
 from ..model.names import curve_parts
 from ..model.quantities import ENERGY, single_quantity
-from ..model.unsupported_elements import refuse_switching_with_controllers
 from ..results.equilibrium import Equilibrium
 from ..results.events import CUMULATIVE_ENERGIES
 from ..results.linear_model import Descriptor, LinearModel, StateSpaceForm
@@ -134,7 +133,6 @@ def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearMo
 
     With sampled controllers they are difference equations over one cycle.
     """
-    refuse_switching_with_controllers(model)
     given, o = o.outputs, replace(o, outputs=tuple(_signal_name(model, name) for name in o.outputs))
     for name in o.outputs:
         single_quantity(model, name)

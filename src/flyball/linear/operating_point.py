@@ -28,7 +28,7 @@ from ..results.result import Result
 from ..results.wording import NOT_JUDGED
 from ..simulation.initial_state import choose_coordinates, find_initial_state
 from ..statics.closed_contacts import find_closed_contacts
-from ..statics.contact_equilibrium import REST_BALANCE, refuse_bulk_and_events, touch_states
+from ..statics.contact_equilibrium import REST_BALANCE, event_notes, refuse_bulk_and_events, touch_states
 from ..statics.replacement_joints import (
     holding_constraint,
     model_with_contact_joints,
@@ -152,7 +152,7 @@ def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O
     _refuse_parameter_inputs(model, getattr(o, "inputs", ()), analysis)
     if isinstance(o.about, Result):
         joined, at, notes = frozen_mode_model(model, o.about, o.parameters or {}, analysis)
-        return joined, dataclasses.replace(o, about=_equilibrium_at(at), t=None), notes
+        return joined, dataclasses.replace(o, about=_equilibrium_at(at), t=None), (*notes, *event_notes(model))
     base = _rest_assembly(model, o, analysis)
     own = base.compiled.parameters
     place = find_closed_contacts(model, base)
@@ -168,7 +168,7 @@ def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O
             f"{model.name!r} does not rest there: contacts, joints and locked elements leave the fraction "
             f"{found.unbalanced:.2g} of the forces unbalanced. Give about=m.equilibrium()"
         )
-    notes = _contact_notes(touch_states(place, found, x, held, bears), base.t)
+    notes = (*_contact_notes(touch_states(place, found, x, held, bears), base.t), *event_notes(model))
     joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()
     c = compile_mechanism(joined, parameters=own)
     q, v = c.take(base.compiled, base.t, base.q, base.v)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 
 from ..constraints.switches.switch_kind import SwitchKind
 from ..errors import ModelError
-from .contact import holds_or_touches
 from .element import Element
 from .model import Model
 
@@ -87,23 +86,6 @@ def refuse_controllers(model: Model, analysis: str) -> None:
             f"{model.name!r} has {titles}, and {analysis} does not support controllers and forces with states; "
             "simulate and linearize do (with drivers of all motions, simulate gives their efforts too). Use a copy of "
             "the mechanism without them, or whose laws have formulas in their place"
-        )
-
-
-def refuse_switching_with_controllers(model: Model) -> None:
-    """Refuse controllers beside contacts, stops, friction and the like.
-
-    Raises
-    ------
-    ModelError
-        If the mechanism has both.
-    """
-    if model.with_states() and holds_or_touches(model):
-        titles = ", ".join(e.title for e in model.with_states()[:3])
-        raise ModelError(
-            f"{model.name!r} has {titles} and parts that hold at times; this analysis supports one of the two, and "
-            "equilibrium, linearize and modes support both. Leave what holds out, m.changed({...: None}), or put "
-            "joints in its place"
         )
 
 

@@ -19,6 +19,7 @@ from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
 from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.contact import not_for_impulse_stepping
+from ..model.event import Action, Lock, Release, Set
 from ..model.model import Model
 from ..model.names import curve_parts
 from ..results.equilibrium import ABOUT_TO_OPEN, AT_FRICTION_LIMIT, CLOSED, FRICTIONLESS, STICKS, Equilibrium, Touch
@@ -345,18 +346,33 @@ def _rest_state(bare: Model, place: ContactState, parameters: Mapping[str, float
 
 
 def refuse_bulk_and_events(model: Model, analysis: str) -> None:
-    """Refuse bulk material and events."""
-    if model.events:
-        without = ", ".join(f"{e.name!r}: None" for e in model.events)
+    """Refuse bulk material, and events that change the mechanism: that lock, release, or set a parameter.
+
+    Other events change states and velocities only, at instants that have no effect on a state of rest.
+    """
+    changing = [e for e in model.events if any(_changes_mechanism(model, a) for a in e.do)]
+    if changing:
+        without = ", ".join(f"{e.name!r}: None" for e in changing)
         raise ModelError(
-            f"{analysis} does not support events, and {model.name!r} has {', '.join(e.title for e in model.events)}; "
-            f"simulate does. Without them: m.changed({{{without}}}).{analysis}(...)"
+            f"{analysis} does not support events that lock, release or set parameters, and {model.name!r} has "
+            f"{', '.join(e.title for e in changing)}; simulate does. Without them: "
+            f"m.changed({{{without}}}).{analysis}(...)"
         )
     if model.bulk:
         names = ", ".join(e.title for e in model.bulk)
         raise ModelError(
             f"{analysis} does not support {names}; describe bodies in contact one by one, or simulate the mechanism"
         )
+
+
+def event_notes(model: Model) -> tuple[str, ...]:
+    """Note on events, which are left out at rest."""
+    return (f"{', '.join(e.title for e in model.events)}: left out",) if model.events else ()
+
+
+def _changes_mechanism(model: Model, action: Action) -> bool:
+    """Whether an action changes constraints or parameters."""
+    return isinstance(action, (Lock, Release)) or (isinstance(action, Set) and action.parameter in model.parameters)
 
 
 def contacts_as_described(model: Model, t: float, parameters: Mapping[str, float] | None) -> ContactState:
@@ -405,7 +421,7 @@ def _contact_equilibrium_result(
     touches = touch_states(place, found, x, *held)
     result = snapshot(MechanismState.resting(c, x.t, x.q, found.lam))
     result.contacts = contact_table(place, found.force)
-    notes = _equilibrium_notes(touches, found, missing)
+    notes = (*_equilibrium_notes(touches, found, missing), *event_notes(model))
     kind = smooth_result.stability if smooth_result else NOT_JUDGED
     if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_OPEN) for k in touches) and kind != "unstable":
         kind = MARGINAL
