@@ -32,7 +32,7 @@ from ..derivatives.nonsmooth_points import refuse_nonsmooth
 from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
 from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
 from ..errors import ModelError
-from ..model.contact import has_switching_elements, holds_or_touches
+from ..model.contact import has_switching_elements
 from ..model.controller import Controller, Sensor
 from ..model.element_laws import Input, with_inputs
 from ..model.model import Model
@@ -100,7 +100,7 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     refuse_cumulative_outputs(model, o.outputs)
     notes: tuple[str, ...] = ()
-    if holds_or_touches(model) or (has_switching_elements(model) and not model.with_states()):
+    if has_switching_elements(model):
         model, o, notes = contact_operating_point(model, o, "linearize")
     out = controlled_linear_model(model, o)[0] if model.with_states() else _smooth_linear_model(model, o)
     out.notes = (*notes, *out.notes)

@@ -12,7 +12,7 @@ from ..derivatives.eigenvalues import EQUAL_TOLERANCE, Spectrum, spectrum
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.linearized_equations import TurningFrame
 from ..derivatives.output_derivatives import snapshot
-from ..model.contact import has_switching_elements, holds_or_touches
+from ..model.contact import has_switching_elements
 from ..model.model import Model
 from ..model.unsupported_elements import refuse_sampled_controllers
 from ..numerics.rank import column_space
@@ -49,7 +49,7 @@ class ModesOptions(OperatingPointOptions):
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Compute the modes about an equilibrium or a steady motion: see `Mechanism.modes`."""
     refuse_sampled_controllers(model, "modes")
-    if holds_or_touches(model) or (has_switching_elements(model) and not model.with_states()):
+    if has_switching_elements(model):
         joined, there, notes = contact_operating_point(model, o, "modes")
         return replace(_smooth_modes(joined, there), notes=notes)
     return _smooth_modes(model, o)

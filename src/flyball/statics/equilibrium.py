@@ -22,7 +22,7 @@ from ..derivatives.equation_derivatives import EquationDerivatives, MechanismSta
 from ..derivatives.linearized_equations import free_coordinates
 from ..derivatives.output_derivatives import snapshot
 from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
-from ..model.contact import has_switching_elements, holds_or_touches
+from ..model.contact import has_switching_elements
 from ..model.element_laws import with_inputs
 from ..model.model import Model
 from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium, FreeStiffness
@@ -269,7 +269,7 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     guess = _initial_guess(model, o)
     begin = _search_start(a, guess)
     begin.compiled.follow((guess or begin).compiled.hints)
-    if holds_or_touches(model):
+    if has_switching_elements(model):
         return closed_contact_equilibrium(model, begin, o.parameters, _rest_of_closed_loop)
     return _rest_of_closed_loop(model.snapshot(), begin)
 
