@@ -311,7 +311,7 @@ def _distinct(p: Prepared, t: _Target, q: Array, begin: _Starts) -> InverseKinem
     whole = np.where(np.isfinite(begin.turn), begin.turn, 1.0)
     q = q + whole * np.ceil(np.maximum(begin.lower - q, 0.0) / whole)  # back between the stops
     q = q - whole * np.ceil(np.maximum(q - begin.upper, 0.0) / whole)
-    order = np.argsort(np.abs((q - first) / units).max(axis=1), kind="stable")
+    order = np.argsort(np.linalg.norm((q - first) / units, axis=1), kind="stable")
     found: list[int] = []
     for k in order.tolist():
         if all(np.abs(difference(q[k], q[i]) / units).max() > DISTINCT for i in found):
