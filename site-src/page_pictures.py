@@ -29,7 +29,7 @@ def main(names: list[str]) -> None:
                 image = Image.open(picture).convert("RGB")
                 scale = min(1.0, WIDTH / image.width)
                 image = image.resize((round(image.width * scale), round(image.height * scale)))
-                image.quantize(COLORS).save(path.parent / "images" / picture.name, optimize=True)
+                image.quantize(COLORS, kmeans=2).save(path.parent / "images" / picture.name, optimize=True)
 
 
 if __name__ == "__main__":
