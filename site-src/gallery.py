@@ -67,17 +67,6 @@ def picture(path: Path) -> str:
         return still_svg(record_motion(reference_result(m), curves=False, with_notes=False))
 
 
-def poster(shown: dict[str, str]) -> str:
-    """Return the pictures of all examples side by side, each a link to its page."""
-    names = [path.removesuffix(".svg").removeprefix("gallery/") for path in shown if path.endswith(".svg")]
-    cells = (
-        f'<a href="gallery/{x}.html" title="{_title(Path(x))}">'
-        f'<img src="gallery/{x}.svg" alt="{_title(Path(x))}" loading="lazy"></a>'
-        for x in names
-    )
-    return '<div class="poster">' + "".join(cells) + "</div>\n"
-
-
 def pages() -> dict[str, str]:
     """Return the text of each page and picture of the gallery by its path."""
     out, cards = {}, []

@@ -23,19 +23,14 @@ SCHEMA = json.dumps(model_schema(Mechanism), indent=1)  # made before examples d
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages and the schema of model files."""
-    shown = gallery.pages()
-    for path, text in (reference.pages() | shown).items():
+    for path, text in (reference.pages() | gallery.pages()).items():
         files.append(File.generated(config, path, content=text))
-    config.extra["poster"] = gallery.poster(shown)
     files.append(File.generated(config, SCHEMA_FILE, content=SCHEMA))
     return files
 
 
-def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
-    """Lead links to examples into the gallery, whose pages show their source; head the first page with a poster."""
-    if page.file.src_uri == "index.md":
-        title, _, rest = markdown.partition("\n")
-        markdown = f"{title}\n\n{config.extra['poster']}\n{rest}"
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Lead links to examples into the gallery, whose pages show their source."""
     up = "../" * page.file.src_uri.count("/")
     markdown = re.sub(r"\[([^]]+)\]\((?:\.\./)+examples/\w+\.(?:urdf|xml)\)", r"\1", markdown)  # no page of the gallery
     return re.sub(r"\]\((?:\.\./)+examples/(\w+)\.\w+\)", rf"]({up}gallery/\1.md)", markdown)

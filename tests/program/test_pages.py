@@ -8,7 +8,7 @@ import warnings
 import pytest
 
 from flyball.model.element import Element
-from tests.pages import PAGES, ROOT, run_page, snippets
+from tests.pages import DOCS, PAGES, ROOT, run_page, snippets
 
 RUN = [p for p in PAGES if any(s.language in ("python", "sh", "toml") for s in snippets(p))]
 NEEDS = {  # pages whose snippets need a package that flyball does not
@@ -39,7 +39,7 @@ def test_page(path, tmp_path, monkeypatch):
                 Element.registry.pop(name, None)
         assert run_page(path, tmp_path) >= 1
     python = re.sub(r"#.*", "", "".join(s.text for s in snippets(path) if s.language == "python"))
-    if path.parent.name == "tutorials":  # site-src/tutorial_pictures.py copies them
+    if path.parent in (DOCS / "tutorials", DOCS / "systems"):  # site-src/page_pictures.py copies them
         shown = re.findall(r"!\[[^\]]+\]\(images/([\w.]+)\)", path.read_text(encoding="utf-8"))
         assert set(shown) <= {p.name for p in tmp_path.iterdir()}
         assert shown or path.name == "index.md"

@@ -1,4 +1,4 @@
-"""Run the tutorials and keep the pictures that they write: python site-src/tutorial_pictures.py [NAME ...]."""
+"""Run the tutorials and systems and keep the pictures that they write: python site-src/page_pictures.py [NAME ...]."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ sys.path.insert(0, str(ROOT))
 os.environ["MPLBACKEND"] = "agg"
 from tests.pages import run_page
 
-TUTORIALS = ROOT / "docs" / "tutorials"
+FOLDERS = ("tutorials", "systems")
 WIDTH, COLORS = 1000, 48  # [px]; a palette of so many colours makes files small
 
 
 def main(names: list[str]) -> None:
     """Run the pages of these names, all if there is none."""
-    for path in sorted(TUTORIALS.glob("*.md")):
+    for path in sorted(p for folder in FOLDERS for p in (ROOT / "docs" / folder).glob("*.md")):
         if names and path.stem not in names:
             continue
         with tempfile.TemporaryDirectory() as folder:
@@ -29,7 +29,7 @@ def main(names: list[str]) -> None:
                 image = Image.open(picture).convert("RGB")
                 scale = min(1.0, WIDTH / image.width)
                 image = image.resize((round(image.width * scale), round(image.height * scale)))
-                image.quantize(COLORS).save(TUTORIALS / "images" / picture.name, optimize=True)
+                image.quantize(COLORS, kmeans=2).save(path.parent / "images" / picture.name, optimize=True)
 
 
 if __name__ == "__main__":
