@@ -58,7 +58,7 @@ class ForceView(PartView):
                 a, b = e.inputs(par, F, M)
                 laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
                 found = e.figures(par, F, M, laws, S.const)
-        return {k: np.broadcast_to(x, (n,)) for k, x in zip(e.outputs, found, strict=True)}
+        return {k: np.broadcast_to(x + 0.0, (n,)) for k, x in zip(e.outputs, found, strict=True)}
 
     @property
     def _states(self) -> tuple[np.ndarray, np.ndarray]:
@@ -314,13 +314,13 @@ class ForceView(PartView):
             if k > 2:
                 return np.abs(value) if name == "taut" else value
             seen = self.element.outward(self._x.numbers[self.element.name])
-            return (self.element.sign if k == 2 else 1.0) * seen * value
+            return (self.element.sign if k == 2 else 1.0) * seen * value + 0.0  # no -0.0 of a slack rope
         inputs, force, _ = self._between()
         if k < 2:
             return inputs[k]
         F, M, _ = self._frames
         along = divide(-dot(force, sub(M[0], F[0])), inputs[0])
-        return unless_zero(inputs[0], along, norm(force))  # a damper between coinciding points: c times its rate
+        return unless_zero(inputs[0], along, norm(force)) + 0.0  # a damper between coinciding points: c times its rate
 
     def channels(self) -> Curves:
         """Return its outputs; for other elements, the components of force and torque that are not zero all the time."""
