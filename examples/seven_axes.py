@@ -2,7 +2,8 @@
 
 Each axis has a rotor, with the moment of inertia that it has behind its gear, and a link; the gear between them is a
 torsional spring with a damper. The controller measures the links and knows a rigid robot: neither the elasticity of the
-gears, nor friction, nor the weight of the rotors. The error of the angles is what the controller does not know, divided by its gains.
+gears, nor friction, nor the weight of the rotors. The error of the angles is what the controller does not know, divided
+by its gains.
 
 Run it with ``python examples/seven_axes.py out``: it prints the errors, and writes a page with the animation.
 """
