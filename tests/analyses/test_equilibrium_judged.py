@@ -200,3 +200,27 @@ def test_two_flat_bars_carry_a_load_as_a_three_hinged_arch(lift):
     found = straight(1.0, (0, -9.81), lift).equilibrium()
     assert found.stability == "stable"
     assert found["A.fx"] == pytest.approx(9.81 / (2.0 * lift), rel=1e-6)  # half a weight at the hinge, twice
+
+
+@pytest.mark.parametrize("links", [*range(1, 14), 150])
+def test_a_trolley_that_is_free_to_roll_is_marginal(links):
+    """Whatever hangs on it: one translation has no stiffness, and rounding is none."""
+    m = fb.Mechanism("trolley", planar=True, gravity=(0, -G))
+    m.add(fb.Body("base", mass=5, inertia=1), fb.Prismatic("rail", "ground", "base", at=(0, 0), axis=(1, 0)))
+    for i in range(links):
+        m.add(fb.Body(f"b{i}", mass=1, inertia=0.01, position=(0, -(i + 0.5) * 0.1)))
+        m.add(fb.Revolute(f"r{i}", f"b{i - 1}" if i else "base", f"b{i}", at=(0, -i * 0.1)))
+        m.add(fb.CoordinateSpring(f"s{i}", f"r{i}.angle", stiffness=5.0, damping=0.05))
+    assert m.equilibrium().stability == "marginal"
+
+
+@pytest.mark.parametrize("more", [0, 150])
+def test_a_strong_damper_hides_no_negative_damping(more):
+    m = fb.Mechanism("two", planar=True, gravity=(0, -G))
+    m.add(fb.Body("block", mass=1000, inertia=10), fb.Prismatic("g", "ground", "block", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("s", "g.displacement", stiffness=1e10, damping=1e7))
+    for i in range(more + 1):
+        m.add(fb.Body(f"p{i}", mass=0.01, inertia=1e-6, position=(3, -0.05)))
+        m.add(fb.Revolute(f"P{i}", "ground", f"p{i}", at=(3, 0)))
+    m.add(fb.Motor("negative", "P0", torque="5e-6*rate"))
+    assert m.equilibrium().stability == "unstable"

@@ -74,3 +74,75 @@ def test_a_brake_along_a_weighted_sum_bears_its_capacity_times_the_weight(capaci
     assert brake.tangential == pytest.approx(0.25 * G, rel=1e-6)
     assert brake.used == pytest.approx(0.25 * G / capacity, rel=1e-6)
     assert np.isclose(brake.normal, capacity)
+
+
+def arm(*parts, position=(0.3, 0.0), **options) -> fb.Mechanism:
+    m = fb.Mechanism("arm", planar=True, gravity=(0, -G), **options)
+    m.add(fb.Body("arm", mass=1, inertia=0.02, position=position), fb.Revolute("A", "ground", "arm", at=(0, 0)))
+    m.add(*parts)
+    return m
+
+
+SPRING = fb.CoordinateSpring("s", "A.angle", stiffness=2, damping=1)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (fb.Rope("x", ("ground", "arm"), at=((0.3, 1), (0.3, 0)), length=1.1),),
+        (fb.Ratchet("x", "A.angle", pitch="20 deg"), fb.Initial("A.angle", value=0.1)),
+    ],
+)
+def test_what_is_slack_as_drawn_is_not_passed(parts):
+    m = arm(SPRING, *parts)
+    with pytest.raises(fb.NotConverged, match="x would open or close"):
+        m.equilibrium()
+    run = m.simulate(30.0)
+    assert m.equilibrium(start=run)["A.angle"] == pytest.approx(run["A.angle"][-1], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        fb.Brake("x", "A.angle", capacity="800*pedal"),
+        fb.JointFriction("x", "A", static=0.0, kinetic=0.0, radius=0.1),
+    ],
+)
+def test_a_brake_that_is_not_applied_holds_nothing(part):
+    m = arm(part, position=(0, 0.3), parameters={"pedal": 0.0})
+    rest = m.equilibrium()
+    assert rest.stability == "unstable"
+    assert not rest.touching
+    growth = np.sqrt(0.3 * G / (0.02 + 0.09))
+    for about in (rest, m.simulate(0.5)):
+        assert m.modes(about=about).omega.max() == pytest.approx(growth, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", [fb.Limit, fb.OneWay])
+def test_a_stop_without_load_is_about_to_open(kind):
+    stop = kind("x", "A.angle", **({"lower": 0.0} if kind is fb.Limit else {}))
+    m = arm(stop, position=(0, 0.3))
+    m.add(fb.Body("w", mass=1, inertia=0.02, position=(1, -0.1)), fb.Revolute("B", "ground", "w", at=(1, 0)))
+    m.add(fb.CoordinateSpring("s", "B.angle", stiffness=3, rest=0.1))
+    rest = m.equilibrium()
+    assert rest.stability == "marginal"
+    assert rest.touching[0].state == "about to open"
+
+
+def test_a_broken_pin_holds_no_more():
+    m = arm(fb.ShearPin("pin", "A.angle", strength=2), SPRING)
+    rest = m.equilibrium(start=m.simulate(30.0))
+    assert rest.broken == ("pin",)
+    alone = arm(SPRING)
+    there = alone.equilibrium()
+    assert rest["A.angle"] == pytest.approx(there["A.angle"], rel=1e-9)
+    assert m.modes(about=rest).omega == pytest.approx(alone.modes(about=there).omega, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", [n for n in PARTS if n != "one way down"])
+def test_motions_start_in_the_equilibrium(name):
+    m = two_links(PARTS[name])
+    rest = m.equilibrium(start=m.simulate(25.0))
+    run = m.simulate(0.5, start=rest)
+    assert np.ptp(run["A.angle"]) < 1e-9
+    assert run["A.angle"][0] == pytest.approx(rest["A.angle"], abs=1e-12)

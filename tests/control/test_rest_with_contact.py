@@ -80,6 +80,15 @@ def test_a_leg_stands_as_if_its_foot_were_ground():
     np.testing.assert_allclose(response(here, 3.0j), response(there, 3.0j), rtol=1e-7)
 
 
+def test_the_end_of_a_motion_with_contact_is_a_start():
+    m = standing(lean=0.2)
+    run = m.simulate(12.0)
+    rest = m.equilibrium(start=run)
+    assert rest["ankle.angle"] == pytest.approx(0.2, abs=1e-9)
+    on = m.simulate(0.5, start=rest)
+    assert np.ptp(on["ankle.angle"]) < 1e-8
+
+
 def response(model: fb.LinearModel, s: complex) -> np.ndarray:
     """C (s I - A)^-1 B + D."""
     return model.C @ np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B) + model.D

@@ -31,9 +31,11 @@ from ..statics.closed_contacts import find_closed_contacts
 from ..statics.contact_equilibrium import REST_BALANCE, event_notes, refuse_bulk_and_events, touch_states
 from ..statics.replacement_joints import (
     holding_constraint,
+    is_released,
     model_with_contact_joints,
     model_without_contacts,
     support_with_friction,
+    switches_at_rest,
 )
 from ..statics.stability import RestState
 
@@ -148,6 +150,8 @@ def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O
         If a contact is at its friction limit.
     """
     refuse_bulk_and_events(model, analysis)
+    if isinstance(o.about, Equilibrium) and o.about.broken:
+        model = model.changed(dict.fromkeys(o.about.broken))
     model = model.snapshot()
     _refuse_parameter_inputs(model, getattr(o, "inputs", ()), analysis)
     if isinstance(o.about, Result):
@@ -253,8 +257,7 @@ def frozen_mode_model(
         raise ModelError(f"{analysis} with contact is about rest: give about=m.equilibrium(), not a motion")
     base = find_initial_state(model, about.final[0], parameters, about, "absolute").base
     own, last = about.values.structure, about.phases.all[-1]
-    c = compile_mechanism(model, parameters=base.compiled.parameters, switches=True)
-    c.at(base.t, *c.take(base.compiled, base.t, base.q, base.v))
+    now = switches_at_rest(model, base)
     gone: dict[str, None] = {e.name: None for e in unsupported_elements(model)}
     parts, slides = list[Element](), list[str]()
     for k, x in enumerate(own.switches):
@@ -264,9 +267,8 @@ def frozen_mode_model(
         if off and x.switch.kind.kinetic:
             gone.pop(e.name, None)
             slides.append(e.title)
-        elif not off:
-            value = float(c.work.sensed.value[c.structure.switches[k].measured])
-            parts.append(holding_constraint(e, x.switch, c.values, value))
+        elif not off and not is_released(model, base, now[k]):
+            parts.append(holding_constraint(e, x.switch, now[k].values, now[k].value))
     out = model.changed(gone)
     out.add(*parts)
     joined = compile_mechanism(out.snapshot(), parameters=base.compiled.parameters)

@@ -59,7 +59,8 @@ class Touch:
         unit = self.unit.replace("*", " ")
         part = f", {100.0 * self.used:.3g} % of its largest force" if self.used else ""
         if self.capacity or self.state == CLOSED:
-            return f"{self.name} {self.state}, carries {self.tangential or self.normal:.4g} {unit}{part}"
+            carried = self.tangential if self.capacity else self.normal
+            return f"{self.name} {self.state}, carries {carried:.4g} {unit}{part}"
         friction = f", friction {self.tangential:.4g} {unit}" if self.used else ""
         return f"{self.name} {self.state}, presses with {self.normal:.4g} {unit}{friction}{part}"
 
@@ -119,6 +120,8 @@ class Equilibrium:
         State of every closed contact, and of every active stop.
     notes : tuple of str
         Further remarks, with contact.
+    broken : tuple of str
+        Shear pins that broke in the motion ``start``.
     """
 
     t: float
@@ -134,6 +137,7 @@ class Equilibrium:
     judged_by: str = ""
     touching: tuple[Touch, ...] = ()
     notes: tuple[str, ...] = ()
+    broken: tuple[str, ...] = ()
     switch_curves: dict[str, float] = field(default_factory=dict, repr=False)  # of stops, ropes, latches, brakes
     free_stiffness: Callable[[], FreeStiffness] = field(default=FreeStiffness, repr=False)  # dense, and slow if large
 

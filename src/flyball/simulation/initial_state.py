@@ -453,6 +453,9 @@ def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | No
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
     c = compile_mechanism(model, parameters=parameters, tree=old.tree, switches=before.phases is not None)
+    same = list(old.slices) == list(c.structure.slices) and old.states == c.structure.states
+    if len(before.t) == 1 and not same:  # of an equilibrium
+        return _state_at_equilibrium(model, t, parameters, before)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
@@ -465,6 +468,16 @@ def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | No
     for name, more in before.wound.items():
         q[plain.values.system.tree.q[plain.structure.place[name]] + 2] -= more
     return Assembly(plain, t, q, v)
+
+
+def _state_at_equilibrium(model: Model, t: float, parameters: Mapping[str, float] | None, rest: Result) -> Assembly:
+    """Return the state of an equilibrium in whose model constraints stand for the stops and contacts that hold."""
+    c = compile_mechanism(model, parameters=parameters)
+    old = rest.values.structure
+    if list(old.place) != list(c.structure.place):
+        raise ModelError(f"the equilibrium of {rest.model.name!r} is of a mechanism with other bodies")
+    q, v, z = np.split(rest.final[1], [old.nq, old.nq + old.nv])
+    return Assembly(c, t, *c.take(CompiledMechanism(rest.values, z.copy()), t, q, v))
 
 
 def start_record(start: InitialState) -> MotionStart:

@@ -220,6 +220,7 @@ HoldingParts = tuple[ActiveConstraints, Mapping[str, float]]
 """Active constraints besides contacts, and the capacity of each sticking part."""
 # Largest correction of the settled position by Newton's method [rad, or relative to the mechanism's length].
 CORRECTION_LIMIT = 0.02
+LOAD_ROUNDING = 1e-12  # a force below this part of all that acts on the mechanism is rounding
 SETTLING_METHOD = "impulse time stepping"
 START_REMEDY = "describe it nearer to its position of rest, or give start= a motion at whose end it rests"
 Search = Callable[[Model, Assembly], Equilibrium]
@@ -454,8 +455,9 @@ def touch_states(
         if name not in bears
     }
     lever = {name: 1.0 / x.row_scale[x.c.structure.slices[name]].max() for name in stops}  # efforts times it: energies
-    heaviest = max((lever[name] * abs(effort) for name, effort in stops.items()), default=0.0)
-    most = max([*found.force[:, 0].tolist(), 0.0])
+    rounding = LOAD_ROUNDING * x.size / NOTHING  # energies
+    heaviest = max([rounding, *(lever[name] * abs(effort) for name, effort in stops.items())])
+    most = max([rounding / x.c.values.length, *found.force[:, 0].tolist()])
     for c, f in zip(place.contacts, found.force, strict=True):
         slides = float(np.hypot(f[1], f[2]))
         most_of_it = c.friction * float(f[0])

@@ -17,6 +17,7 @@ from ..analysis_options import AnalysisOptions
 from ..assembly.assemble import assemble
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
+from ..constraints.switches.switch_kind import OFF
 from ..derivatives.eigenvalues import spectrum
 from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, StateSizes, state_sizes
 from ..derivatives.linearized_equations import free_coordinates
@@ -29,7 +30,6 @@ from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, Equilibrium, F
 from ..results.result import Result
 from ..results.wording import STABLE, UNSTABLE
 from ..simulation.diagnosis import refuse_contradicting_limits
-from ..simulation.initial_state import find_initial_state as begin_motion
 from ..tables.structure_definition import velocity_names
 from .contact_equilibrium import closed_contact_equilibrium, contact_equilibrium
 from .equilibrium_search import (
@@ -233,6 +233,9 @@ def rest_options(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """Find a static equilibrium near the described position, or a steady motion: see `Mechanism.equilibrium`."""
+    broken = _broken_parts(model, o.start) if isinstance(o.start, Result) else ()
+    if broken:
+        return replace(equilibrium(model.changed(dict.fromkeys(broken)), o), broken=broken)
     if model.with_states():
         return _controlled_equilibrium(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
@@ -246,6 +249,15 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     if o.preload:
         return equilibrium_result(*preloaded_rest(begin, o.preload), "preload")
     return _searched_equilibrium(RestState.at(a.compiled, a.t, begin.q), o.stable)
+
+
+def _broken_parts(model: Model, run: Result) -> tuple[str, ...]:
+    """Names of the parts of a model that broke in a motion: shear pins."""
+    if run.phases is None:
+        return ()
+    last = zip(run.values.structure.switches, run.phases.all[-1].modes.mode, strict=True)
+    broken = (x.element.name for x, mode in last if x.switch.kind.permanent and mode == OFF)
+    return tuple(name for name in broken if name in model)
 
 
 def _refuse_speeds(a: Assembly) -> None:
@@ -305,10 +317,9 @@ def _refuse_with_contact(o: EquilibriumOptions) -> None:
 def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
     """The equilibrium or end of a motion to start from, with its controller states; None if not given."""
     if isinstance(o.start, Result):
-        start = begin_motion(model, o.start.final[0], o.parameters, o.start, "absolute")
-        s = start.assembly.compiled.structure
-        start.assembly.compiled.z = start.y[s.nq + s.nv :].copy()
-        return start.assembly
+        s = o.start.values.structure
+        q, v, z = np.split(o.start.final[1], [s.nq, s.nq + s.nv])
+        return Assembly(CompiledMechanism(o.start.values, z.copy()), o.start.final[0], q, v)
     if o.start is None:
         return None
     if isinstance(o.start, Equilibrium):

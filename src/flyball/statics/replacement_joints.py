@@ -19,8 +19,7 @@ import numpy as np
 from ..assembly.assembled_state import Assembly
 from ..assembly.compiled_mechanism import compile_mechanism
 from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
-from ..constraints.switches.stop import STOP
-from ..constraints.switches.switch_kind import INTERVAL, NO_ROW, STATIC, SwitchKind
+from ..constraints.switches.switch_kind import G_LOWER, G_UPPER, INTERVAL, NO_ROW, STATIC, SwitchKind
 from ..derivatives.equation_derivatives import MechanismState
 from ..derivatives.output_derivatives import snapshot
 from ..engine.entry_point import MOTION
@@ -196,7 +195,7 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
         e, kind = x.element, x.switch.kind
         _refuse_undecided(e, kind)
         sign = kind.push_direction(x.value, x.bounds, x.near)
-        if sign is not None:
+        if sign is not None and not is_released(model, at, x):
             part = holding_constraint(e, x.switch, x.values, x.value)
             lead = float(part.weights[0]) if isinstance(part, HeldCoordinate) else 1.0
             out.parts.append(part)
@@ -209,10 +208,26 @@ def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
     return out
 
 
+def is_released(model: Model, at: Assembly, x: SwitchAtRest) -> bool:
+    """Whether an element that holds by friction has no capacity at all: an open clutch, a brake that is not applied."""
+    if x.switch.kind.forces != INTERVAL:
+        return False
+    if not x.element.acts():
+        return x.strength == 0.0
+    unit = (1.0, 1.0, 1.0)  # any load: friction in proportion to it
+    return friction_capacity(model, at, x.element, lambda joint: (unit, unit)) == 0.0
+
+
 def stops_beyond(model: Model, at: Assembly) -> list[str]:
-    """Names of the stops, plays and ropes that are beyond a bound at a position."""
-    stops = [x for x in switches_at_rest(model, at) if x.switch.kind is STOP]
-    return [x.element.name for x in stops if not x.bounds[0] - x.near <= x.value <= x.bounds[1] + x.near]
+    """Names of the stops, plays, ropes and latches that are beyond a bound at a position."""
+    out = []
+    for x in switches_at_rest(model, at):
+        guards = x.switch.kind.guards
+        below = G_LOWER in guards and x.value < x.bounds[0] - x.near
+        above = G_UPPER in guards and x.value > x.bounds[1] + x.near
+        if below or above:
+            out.append(x.element.name)
+    return out
 
 
 class SwitchAtRest(NamedTuple):

@@ -301,6 +301,7 @@ class RestState:
         return now.balanced()
 
 
+PROJECTION_ROUNDING = 4 * np.finfo(float).eps  # of products with the basis of free motions, relative to their terms
 NEUTRAL_STIFFNESS = 1e-8  # stiffness below this part of its terms counts as zero
 
 
@@ -329,6 +330,7 @@ def constrained_stiffness(x: RestState, f: FreeCoordinates) -> ConstrainedStiffn
     K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
     Z = f.Zv / x.scale[:, None]
     blur = np.max([np.abs(f.Zv.T @ d @ f.Zv) for d in stiffness_rounding(e)], axis=0)
+    blur += PROJECTION_ROUNDING * (np.abs(f.Zv.T) @ (abs(e.by_position[e.at["r"]]) @ np.abs(f.Zv)))
     unit = np.abs(K).sum(axis=1) + blur.sum(axis=1)
     unit = 1.0 / np.sqrt(np.where(unit > 0.0, unit, 1.0))
     own, blur = (unit[:, None] * X * unit for X in (K, blur))
@@ -341,7 +343,8 @@ def constrained_stiffness(x: RestState, f: FreeCoordinates) -> ConstrainedStiffn
         along = Z @ (unit[:, None] * V)
         size = np.abs(along)
         acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + acts_by @ size**2
-        real = np.abs(w) > (np.abs(V) * (blur @ np.abs(V))).sum(axis=0)
+        rounding = len(own) * PROJECTION_ROUNDING * np.abs(w).max(initial=0.0)  # of the eigenvalues
+        real = np.abs(w) > (np.abs(V) * (blur @ np.abs(V))).sum(axis=0) + rounding
         parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
         return along / np.linalg.norm(along, axis=0), parts
 
@@ -453,7 +456,7 @@ def _interior_step(A: np.ndarray) -> np.ndarray | None:
     return found.x[:n] if found.success and found.x[-1] > INSIDE_TOLERANCE else None
 
 
-NEGATIVE_DAMPING = 1e-12  # negative damping below this part of the largest is rounding
+NEGATIVE_DAMPING = 1e-12  # negative damping below this part of what acts on its coordinate is rounding
 
 
 @dataclass
@@ -556,14 +559,19 @@ def _sign_of_stiffness(x: RestState) -> int:
 
 
 def _may_have_negative_damping(x: RestState) -> bool:
-    """Whether velocity-dependent forces may add energy to a motion: their matrix has a negative pivot."""
+    """Whether velocity-dependent forces may add energy to a motion: their scaled matrix has a negative pivot."""
     import scipy.sparse as sp
 
     e = x.equations
     D = e.by_velocity[e.at["r"]]
-    D = D + D.T
-    most = abs(D).max()
-    return bool(most) and negative_pivots(D + NEGATIVE_DAMPING * most * sp.identity(D.shape[0])) > 0
+    own = sp.diags(_damping_scale(np.asarray(abs(D).sum(axis=1)).ravel()))
+    D = own @ (D + D.T) @ own
+    return bool(D.nnz) and negative_pivots(D + NEGATIVE_DAMPING * sp.identity(D.shape[0])) > 0
+
+
+def _damping_scale(size: np.ndarray) -> np.ndarray:
+    """Factors 1 / sqrt(damping) for each row, so that a strong damper hides no weak one."""
+    return 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
 def _computed_stability(x: RestState) -> Stability:
@@ -593,9 +601,12 @@ def _computed_stability(x: RestState) -> Stability:
 
 def _has_negative_damping(e: EquationDerivatives, f: FreeCoordinates) -> bool:
     """Whether velocity-dependent forces add energy to some motion (negative damping)."""
-    D = f.Zv.T @ e.by_velocity[e.at["r"]] @ f.Zv
+    D = e.by_velocity[e.at["r"]]
+    size = np.abs(f.Zv.T) @ (abs(D) @ np.abs(f.Zv)).sum(axis=1)
+    own = _damping_scale(size)
+    D = own[:, None] * (f.Zv.T @ D @ f.Zv) * own
     d = np.linalg.eigvalsh(0.5 * (D + D.T))
-    return bool(len(d) and d[0] < -NEGATIVE_DAMPING * np.abs(d).max())
+    return bool(len(d) and d[0] < -NEGATIVE_DAMPING)
 
 
 def stability_by_eigenvalues(eigenvalues: Spectrum, *, discrete: bool = False) -> str:
