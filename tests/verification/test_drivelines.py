@@ -93,6 +93,14 @@ def test_gears_are_shifted_up_and_down_at_their_speeds():
     assert abs(run.health.energy_drift) < 1e-5 * run.energy.kinetic.max()
 
 
+def test_a_motion_that_starts_beyond_a_shift_speed_shifts():
+    """20 m/s are 2546 rpm in first gear, 637 rpm in third."""
+    up = car(speed=20.0, gear=1, box={"up": "2000 rpm", "down": "400 rpm"}).simulate(4.0)
+    assert up["box_target"].output[-1] >= 2
+    down = car(torque=0.0, speed=20.0, gear=3, box={"up": "4000 rpm", "down": "900 rpm"}).simulate(4.0)
+    assert down["box_target"].output[-1] == 2
+
+
 def test_idle_speed_and_limiter():
     """Out of gear: governor's and friction's torque meet within the band below idle; full throttle ends at the limit."""
     rows = ((-20.0, 150.0), (-20.0, 150.0))

@@ -103,7 +103,7 @@ def test_free_vibration_decays_and_energy_balances():
     r = m.simulate(1.0)
     assert np.abs(r["R.value"][-10:]).max() < 0.2e-3
     assert np.abs(r["energy.balance"]).max() < 1e-6 * 0.5 * K * 4e-6
-    assert r.events["R_turns"][0].t > 0
+    assert r.events["R_turns_up"][0].t > 0 and r.events["R_turns_down"][0].t > 0
 
 
 def test_in_a_part_of_another_mechanism():
@@ -142,3 +142,19 @@ def test_friction_is_none_in_an_equilibrium_and_stiffens_the_linear_model():
     assert np.abs(eigenvalues.imag).max() == pytest.approx(np.sqrt((K + MOST / TRAVEL) / mass), rel=1e-9)
     run = m.simulate(0.5, start=rest)
     assert np.abs(run["G.displacement"] - rest["G.displacement"]).max() < 1e-12
+
+
+@pytest.mark.parametrize("damping", [2.0, 20.0])
+def test_friction_brings_a_mass_to_rest(damping):
+    """Where what remains is the spring's force, the load and friction; turning points end with the motion."""
+    m = fb.Mechanism("mount", planar=True)
+    m.add(fb.Body("b", mass=2, inertia=1), fb.Prismatic("G", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Rubber("R", "G.displacement", stiffness=1000, friction=50, friction_travel=0.01))
+    m.add(fb.Actuator("load", "G.displacement", force=20))
+    m.add(fb.CoordinateSpring("damper", "G.displacement", stiffness=0, damping=damping))
+    r = m.simulate(60.0)
+    rest = r["G.displacement"][-1]
+    assert r.t[-1] == 60.0
+    assert np.ptp(r["G.displacement"][r.t > 50.0]) < 1e-7
+    assert 1000 * rest == pytest.approx(20 + r["R_friction.value"][-1], rel=1e-6)
+    assert abs(r["R_friction.value"][-1]) < 50

@@ -19,7 +19,7 @@ from .clutch import Brake
 if TYPE_CHECKING:
     from ..model.model import Model
 
-LONG_AGO = -1e9  # s: time of the last shift at the start of a motion
+START_DELAY = 1e-6  # part of the duration of a shift after which a motion from t = 0 may have its first one
 
 
 @element
@@ -117,7 +117,7 @@ class GearBox(CoordinateForce):
         return (
             state(gear, rate="0", initial=self.gear),
             state(target, rate="0", initial=self.gear),
-            state(shifted, rate="0", initial=LONG_AGO),
+            state(shifted, rate="0", initial=f"-(1 - {START_DELAY})*({opening} + ({self.closing}))"),
             *self._schedule(resolve(self, model.environment()).ratios, target, shifted),
             Event(f"{self.name}_engages", f"{since} - {opening}", do=(Set(f"{gear}.value", target),)),
             *(

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 
+STILL = 1e-9  # friction travels per second, and part of the largest friction, below which nothing moves
+
+
 @element
 class Rubber(CoordinateForce):
     """A rubber spring along a coordinate: elastic, viscous and friction forces added up.
@@ -34,8 +37,8 @@ class Rubber(CoordinateForce):
     analysis*, Vehicle System Dynamics 30, 1998).
 
     Its parts belong to it: the `CoordinateSpring` ``NAME_spring``, which carries the force, the states
-    ``NAME_viscous_1``, ..., ``NAME_friction`` [N] or [N m], and with friction the `Event` ``NAME_turns`` at every
-    turning point. A motion begins relaxed and without friction.
+    ``NAME_viscous_1``, ..., ``NAME_friction`` [N] or [N m], and with friction the `Event`s ``NAME_turns_up`` and
+    ``NAME_turns_down`` at every turning point. A motion begins relaxed and without friction.
 
     Parameters
     ----------
@@ -125,17 +128,23 @@ class Rubber(CoordinateForce):
         return (*out, CoordinateSpring(f"{self.name}_spring", self.coordinate, force=law, **own))
 
     def _friction(self, state: Any, speed: str, force: str) -> tuple[Element, ...]:
-        """Return the state of friction, its value at the last turning point, and the event there.
+        """Return the states of friction, and the events of its turning points.
 
         Berg's law as a differential equation: dF/dx = -(F_m / x_2) ((F_m + s F) / (F_m + s F_s))^2 with the force F on
-        the coordinate and s the sign of the rate.
+        the coordinate and s the direction, which is 0 until friction has first moved. The direction and F_s change
+        where the speed exceeds `STILL`, so that what has come to rest but for rounding turns no more.
         """
-        most, turned = f"({self.friction})", f"{self.name}_turned"
-        slope = f"{most}/({self.friction_travel})"
+        most, turned, way = f"({self.friction})", f"{self.name}_turned", f"{self.name}_direction"
+        slope, slow = f"{most}/({self.friction_travel})", f"{STILL}*({self.friction_travel})"
         up, down = (f"(({most} {s} {force})/({most} {s} {turned}))**2" for s in "+-")
-        rate = f"-{slope}*{speed}*where({speed} > 0, {up}, {down})"
-        return (
-            state(turned, rate="0"),
-            state(force, rate=rate),
-            Event(f"{self.name}_turns", speed, direction="either", do=(Set(f"{turned}.value", force),)),
-        )
+        rate = f"-{slope}*{speed}*where({way} > 0.5, {up}, where({way} < -0.5, {down}, 1))"
+        first = f"abs({force}) - {STILL}*{most}"  # positive once it has moved
+        turns = [
+            Event(
+                f"{self.name}_turns_{name}",
+                f"min({s}{speed} - {slow}, where(abs({way}) < 0.5, {first}, -({s}{way})))",
+                do=(Set(f"{turned}.value", force), Set(f"{way}.value", f"{s}1")),
+            )
+            for name, s in (("up", "+"), ("down", "-"))
+        ]
+        return (state(turned, rate="0"), state(way, rate="0"), state(force, rate=rate), *turns)
