@@ -26,12 +26,12 @@ from .contact_operator import (
     contact_angular_velocity,
     contact_range,
     contact_terms,
+    contact_velocity,
     finish_solve,
     line_diagonal,
     line_range,
     line_velocity,
     node_range,
-    contact_velocity,
     residual_summary,
     rolling_diagonal_block,
 )
