@@ -37,7 +37,7 @@ from ...engine.solve import apply_inverse_mass
 from ...math.rotation import rotation_vector
 from ...math.scalar import sqrt
 from ...math.vec import add, col, dot, load3, mm, norm, sub, transpose
-from ...numerics.complementarity.contact_operator import find_columns
+from ...numerics.complementarity.contact_operator import find_columns, row_product
 from ...numerics.complementarity.contact_problem import FIXED_SIDE
 from ...numerics.sparse_factorisation import COLUMNS, add_columns, ldl_solve_columns, load_columns, store_columns
 from ...tables.table_definitions import SCHUR, STEP
@@ -487,9 +487,7 @@ def friction_law(A, P, i, k, x):
     """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
     h, lever = A.real.step, line_lever(A, k)
     g, at = A.active.group[i], A.active.first[i]
-    w = 0.0
-    for d in range(A.group[g + 1] - A.group[g]):
-        w += P.J[at + d] * P.Y[at + d]
+    w = row_product(P, at, A.group[g + 1] - A.group[g], at, P.Y, at)
     t, arm, load = A.real.time + 0.5 * h, A.line_law.arm[k], A.line_law.load[k]
     rate = line_rate(A, k, A.velocities.before)
     held = h * static_friction_limit(A.S, A.W, A.line.force[k], t, arm, load)
@@ -506,9 +504,7 @@ def rope_law(A, P, i, k, x):
     h = A.real.step
     K, C = A.line_law.stiffness[k], A.line_law.damping[k]
     g, at = A.active.group[i], A.active.first[i]
-    w = 0.0
-    for d in range(A.group[g + 1] - A.group[g]):
-        w += P.J[at + d] * P.Y[at + d]
+    w = row_product(P, at, A.group[g + 1] - A.group[g], at, P.Y, at)
     z = 0.25 * h * (h * K + C) * w
     b = z * z / (1.0 + z * z)
     added = h * h * K * (0.25 + 0.75 * b) + h * C * (0.5 + 0.5 * b)
