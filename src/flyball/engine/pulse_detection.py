@@ -3,9 +3,8 @@
 Each law that can act briefly is sampled along the step; its inputs follow the cubics through their values and rates at
 the ends. Where it departs from the polynomial through eight of its values, the place is reported, and the integrator
 decides whether that matters. The number of samples is relative to the whole time span and so bounded: what is shorter
-than a `SAMPLES`-th of the span may fall between them. A law that has one value in the whole step, by interval
-arithmetic, is not sampled: that of a clutch that is not shifted. A force whose formula is discontinuous somewhere (a
-rotation vector at half a turn) must be on the same branch at both ends of the step.
+than a `SAMPLES`-th of the span may fall between them. A force whose formula is discontinuous somewhere (a rotation
+vector at half a turn) must be on the same branch at both ends of the step.
 """
 
 from __future__ import annotations
@@ -15,32 +14,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ..compiler.formulas import formula
-from ..laws.bytecode import (
-    ADD,
-    ATAN,
-    CALL,
-    CONSTANT,
-    COPY,
-    CUBIC,
-    DIVIDE,
-    EXP,
-    INPUT,
-    KEEP,
-    MAXIMUM,
-    MINIMUM,
-    MULTIPLY,
-    NEGATE,
-    NOT,
-    QUINTIC,
-    SENSOR,
-    SINH,
-    SUBTRACT,
-    TANH,
-    evaluate,
-    evaluate_jet,
-    function_value,
-    may_be_brief,
-)
+from ..laws.bytecode import SENSOR, evaluate, evaluate_jet, may_be_brief
 from ..math.scalar import cos
 from ..numerics.integrators.time_loop import (
     AT_END,
@@ -124,7 +98,7 @@ def inspect_step(t, h, span, first, buffer, S, W):
     again = first % 2 == 1  # the law reported last has a second place
     for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0] + 3):
         law = law_at(S, k)
-        if buffer[LAW_SELECTED, k] > 0.0 and (again or not is_constant_within(S, W, k, law, t, h, buffer)):
+        if buffer[LAW_SELECTED, k] > 0.0:
             n = max(MIN_SAMPLES, int(SAMPLES * min(1.0, h / span)))
             if again:
                 x, share = farthest_from_mean(S, W, k, law, t, h, n, buffer)
@@ -190,101 +164,6 @@ def branch_changes(S, buffer, h):
             if not (s > 0.0 and speed * h <= MAX_TURN):
                 return True
     return False
-
-
-@formula
-def is_constant_within(S, W, k, law, t, h, buffer):
-    """Whether law number k, of a force, has one value in the whole step, but for rounding."""
-    if k >= LAWS * S.forces.F.shape[0]:
-        return False
-    low, high = law_range(S, W, k, law, t, h, buffer)
-    return high - low <= LAW_ROUNDING * max(abs(low), abs(high))
-
-
-@formula
-def law_range(S, W, k, law, t, h, buffer):
-    """Range of the law of a force over the step, by interval arithmetic; everything where an operation is not simple.
-
-    The stack holds lower ends in its first column, upper ends in the second.
-    """
-    stack, code, nm, top = W.stack, S.code, count_measured(S), -1
-    for i in range(law + 2, law + 2 + 2 * code[law], 2):
-        operation, operand = code[i], code[i + 1]
-        if operation == CONSTANT:
-            top += 1
-            stack[top, 0] = stack[top, 1] = S.const[operand]
-        elif operation == INPUT and operand == 0:
-            top += 1
-            stack[top, 0], stack[top, 1] = t, t + h
-        elif operation == INPUT or operation == SENSOR:
-            top += 1
-            own = nm + k // LAWS
-            if operation == INPUT:
-                stack[top, 0], stack[top, 1] = input_range(buffer, own, h, operand == 2)
-            elif operand < 2 * nm:
-                stack[top, 0], stack[top, 1] = input_range(buffer, operand % nm, h, operand >= nm)
-            else:
-                stack[top, 0] = stack[top, 1] = buffer[INPUTS_WITHIN, operand]
-        elif operation == COPY:
-            top += 1
-            stack[top, 0], stack[top, 1] = stack[operand, 0], stack[operand, 1]
-        elif operation == KEEP:
-            stack[top - operand, 0], stack[top - operand, 1] = stack[top, 0], stack[top, 1]
-            top -= operand
-        elif operation == CALL:
-            stack[top, 0], stack[top, 1] = function_range(operand, stack[top, 0], stack[top, 1])
-        elif operation >= ADD:
-            top -= 1
-            a, b = (stack[top, 0], stack[top, 1]), (stack[top + 1, 0], stack[top + 1, 1])
-            stack[top, 0], stack[top, 1] = combine_ranges(operation, a, b)
-        else:
-            return -UNBOUNDED, UNBOUNDED
-    return stack[0, 0], stack[0, 1]
-
-
-@formula
-def input_range(buffer, m, h, rate):
-    """Range over the step of the cubic of `input_within` in column m, or of its rate: that of its control points."""
-    f, g = buffer[INSPECTED_START, m], buffer[INSPECTED_END, m]
-    u, v = buffer[INSPECTED_START_RATE, m], buffer[INSPECTED_END_RATE, m]
-    if rate:
-        w = 3.0 * (g - f) / h - u - v
-        return min(u, w, v), max(u, w, v)
-    a, b = f + h * u / 3.0, g - h * v / 3.0
-    return min(f, a, b, g), max(f, a, b, g)
-
-
-@formula
-def function_range(function, low, high):
-    """Range of a monotonic function; everything for the others."""
-    if function == NEGATE:
-        return -high, -low
-    if function == NOT:
-        return 1.0 - high, 1.0 - low
-    rises = function == TANH or function == ATAN or function == EXP or function == SINH
-    if rises or ((function == CUBIC or function == QUINTIC) and low >= 0.0 and high <= 1.0):
-        return function_value(function, low), function_value(function, high)
-    return -UNBOUNDED, UNBOUNDED
-
-
-@formula
-def combine_ranges(operation, a, b):
-    """Range of an operation on two ranges; everything for those that are not simple."""
-    if operation == ADD:
-        return a[0] + b[0], a[1] + b[1]
-    if operation == SUBTRACT:
-        return a[0] - b[1], a[1] - b[0]
-    if operation == MULTIPLY or (operation == DIVIDE and b[0] == b[1] and b[0] != 0.0):
-        c, d = (b[0], b[1]) if operation == MULTIPLY else (1.0 / b[0], 1.0 / b[0])
-        if (a[0] == 0.0 and a[1] == 0.0) or (c == 0.0 and d == 0.0):
-            return 0.0, 0.0
-        p, q, r, s = a[0] * c, a[0] * d, a[1] * c, a[1] * d
-        return min(p, q, r, s), max(p, q, r, s)
-    if operation == MINIMUM:
-        return min(a[0], b[0]), min(a[1], b[1])
-    if operation == MAXIMUM:
-        return max(a[0], b[0]), max(a[1], b[1])
-    return -UNBOUNDED, UNBOUNDED
 
 
 @formula
