@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from flyball.numerics.complementarity.contact_operator import find_columns
 from flyball.numerics.complementarity.contact_problem import (
     ContactProblem,
     allocate_solver,
@@ -146,6 +147,7 @@ def chain(links: int = 20, tip: float = 100.0) -> tuple[ContactProblem, np.ndarr
         J = q @ point(i, along[i] * (end - 0.5) + [0, 0, -0.03])
         P.at[c], P.block[c] = (-1, -2), (-1, 3 * n * c)
         P.J[3 * n * c : 3 * n * (c + 1)], P.Y[3 * n * c : 3 * n * (c + 1)] = J.ravel(), (J @ inverse).ravel()
+        find_columns(P, 3 * n * c, n, 3)
     P.frame[:], P.mu[:] = q.ravel(), 0.5
     wide = np.tile([0.3, 0, -STEP * GRAVITY, 0, 0, 0], links)
     return P, np.zeros((0, 8)), wide  # all alike: the joints are fulfilled

@@ -8,7 +8,6 @@ engines at equal error in one run. Usage: ``python systems.py [own] [arm6] [arm7
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -37,6 +36,7 @@ OWN = {
 }
 X, Y, Z = np.eye(3)
 SPEED = 8.0  # of the truck [m/s]
+STEP = 4e-3  # of the examples with tracks [s]: each is an output time where forces are averaged
 TRUCK_SETTINGS = ("generalised-alpha 0.95", "generalised-alpha 0.7")  # trapezoidal, index 2: no end in minutes
 
 
@@ -74,8 +74,14 @@ def coasting() -> fb.Mechanism:
     return m.changed(parts | {s.name: None for s in m.sensors})
 
 
+def rough_road() -> fb.Mechanism:
+    """The truck on a random road of class C at 15 m/s."""
+    return module("truck").truck(fb.RandomRoad(roughness="C", length=300, track=2, start=-10, run_in=15), speed=15.0)
+
+
 SYSTEMS = {
     "truck over a ramp": System(lambda: module("truck").mechanism(), 4.0),
+    "truck on a rough road": System(lambda: rough_road(), 4.0),
     "truck, lane change": System(lambda: module("truck").truck(None, lane=3.0), 10.0),
     "bogie on rollers, hunting": System(lambda: module("bogie_on_rollers").mechanism(), 3.0),
     "press": System(lambda: module("press").mechanism(), 10.0),
@@ -238,28 +244,40 @@ def compare_truck(target: float = 1e-6) -> list[dict[str, Any]]:
     return rows + contest.run(case, [], others)
 
 
-def compare_track() -> list[dict[str, Any]]:
-    """The tracked vehicle on level soil for 4 s: flyball's example and MuJoCo's contacts, stiff as the step allows."""
-    example_ = module("tracked_vehicle")
-    t_end, rows = 4.0, []
-    weight = example_.G * sum(b.mass for b in example_.mechanism().bodies)
+def stepped_track(engine: str, name: str, t_end: float, tracks: tuple[str, ...]) -> tuple[dict[str, Any], Any]:
+    """The second call of an example with tracks on level soil: row of the table, and the example."""
+    example_ = module(name)
     m = example_.mechanism()
-    for _ in range(2):
-        begin = time.process_time()
-        run = m.simulate(t_end, outputs=201, method=example_.STEPS, progress=False)
-        seconds = time.process_time() - begin
-    soil = sum(run.contacts.between("ground", f"track.shoe_{k}").force for k in range(example_.SHOES))
-    rows.append({"engine": "flyball", "h": 5e-3, "seconds": seconds, "speed": run["hull"].velocity[100:, 0].mean(),
-                 "soil": soil[100:, 1].mean() / weight, "overlap": 1e3 * run.health.contact.worst_overlap})  # fmt: skip
+    weight = example_.G * sum(b.mass for b in m.bodies)
+    run = m.simulate(t_end, outputs=round(t_end / STEP) + 1, method=example_.STEPS, progress=False)
+    seconds = timing.cpu(lambda: m.simulate(t_end, outputs=201, method=example_.STEPS, progress=False))
+    shoes = [f"{track}.shoe_{k}" for track in tracks for k in range(example_.SHOES)]
+    soil = sum(run.contacts.between("ground", shoe).force for shoe in shoes)
+    late = run.t > t_end / 2.0
+    upward = soil[late, 1 if m.planar else 2].mean()
+    return {"engine": engine, "h": run.health.contact.step, "seconds": seconds / t_end,
+            "speed": run["hull"].velocity[late, 0].mean(), "soil": upward / weight,
+            "overlap": 1e3 * run.health.contact.worst_overlap}, example_  # fmt: skip
+
+
+def compare_track() -> list[dict[str, Any]]:
+    """Tracked vehicles on level soil: flyball's examples for 4 s and 2 s, and the planar one by MuJoCo's contacts.
+
+    MuJoCo's contacts are as stiff as its steps allow.
+    """
+    t_end = 4.0
+    row, example_ = stepped_track("flyball", "tracked_vehicle", t_end, ("track",))
+    rows = [row, stepped_track("flyball, in space", "tracked_vehicle_in_space", 2.0, ("left", "right"))[0]]
+    weight = example_.G * sum(b.mass for b in example_.mechanism().bodies)
     for h in (5e-3, 2e-3, 1e-3, 5e-4):
         try:
             found = peers.mujoco_track(example_.mechanism(), example_.SPEED, t_end, h, (2 * h, 1.0))
         except RuntimeError as error:
             rows.append({"engine": f"mujoco: {error}", "h": h})
             continue
-        rows.append({"engine": "mujoco", "h": h, "seconds": found["seconds"], "speed": found["speed"],
+        rows.append({"engine": "mujoco", "h": h, "seconds": found["seconds"] / t_end, "speed": found["speed"],
                      "soil": found["soil"] / weight, "overlap": 1e3 * found["overlap"]})  # fmt: skip
-    columns = {"engine": "engine", "h": "step [s]", "seconds": "CPU s", "speed": "speed [m/s]",
+    columns = {"engine": "engine", "h": "step [s]", "seconds": "CPU s per s", "speed": "speed [m/s]",
                "soil": "force of soil / weight", "overlap": "overlap [mm]"}  # fmt: skip
     print(timing.table(rows, columns))
     return rows

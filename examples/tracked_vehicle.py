@@ -20,7 +20,7 @@ SHOES, PITCH, THICKNESS, SHOE = 54, 0.15, 0.03, 8.0  # number, m, m, kg
 TEETH = 13
 SPEED = 1.5  # m/s
 G = 9.81
-STEPS = fb.Stepping(step="5 ms", solver="gauss-seidel", tolerance=5e-3)
+STEPS = fb.Stepping(step="4 ms", solver="gauss-seidel", tolerance=5e-3)
 
 
 def running_gear(**options: float) -> fb.Mechanism:

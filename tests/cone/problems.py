@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flyball.numerics.complementarity.contact_operator import find_columns
 from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 
 KINDS = {
@@ -38,6 +39,7 @@ class Builder:
         J = self.rng.standard_normal((rows, self.sizes[g]))
         at, end = self.used, self.used + J.size
         self.P.J[at:end], self.P.Y[at:end] = J.ravel(), (J @ np.linalg.inv(self.inertia[g])).ravel()
+        find_columns(self.P, at, self.sizes[g], rows)
         self.used = end
         return at
 

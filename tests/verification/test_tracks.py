@@ -64,7 +64,7 @@ def test_hanging_run_is_a_catenary():
 
 def test_weight_and_speed_of_the_vehicle():
     """The soil's mean force is the weight, but for the momentum at the end; every step is an output time."""
-    run = VEHICLE["mechanism"]().simulate(2.2, outputs=441, method=VEHICLE["STEPS"])
+    run = VEHICLE["mechanism"]().simulate(2.2, outputs=551, method=VEHICLE["STEPS"])
     t = run.t
     soil = sum(run.contacts.between("ground", f"track.shoe_{k}").force for k in range(SHOES))
     weight = 9.81 * sum(b.mass for b in run.model.bodies)

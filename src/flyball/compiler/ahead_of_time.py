@@ -21,7 +21,7 @@ from .kernels import Kernel
 from .object_code import baseline, compile_kernel
 from .object_files import COSTS, DEFAULT_COST, cache_folder, file_name, read_object, write_object
 
-_DECORATED = re.compile(r"^@(first_order_)?kernel$", re.MULTILINE)
+_DECORATED = re.compile(r"^@(first_order_|vectorised_)?kernel$", re.MULTILINE)
 # Child processes find modules where this process does, and leave interrupts to it.
 _WORKER = """import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)

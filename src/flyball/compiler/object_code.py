@@ -71,18 +71,15 @@ def target_machine(cpu: str = "", system: str = "") -> Any:
 
 def object_code_of_text(text: str, level: int = 2) -> bytes:
     """Object code of one module in LLVM's language."""
-    return emit_object(llvm_binding().parse_assembly(text), target_machine(), level)
+    return emit_object(llvm_binding().parse_assembly(text), target_machine(), level, False)
 
 
-def emit_object(module: Any, machine: Any, level: int) -> bytes:
-    """Object code of a module, at an optimisation level of LLVM.
-
-    Loops and straight code are not vectorised: measured, the same speed or slower, and longer compilation.
-    """
+def emit_object(module: Any, machine: Any, level: int, vectorised: bool) -> bytes:
+    """Object code of a module, at an optimisation level of LLVM, with loops and straight code vectorised or not."""
     with _LLVM_LOCK:
         module.triple, module.data_layout = machine.triple, str(machine.target_data)
         options = llvm_binding().create_pipeline_tuning_options(speed_level=level)
-        options.loop_vectorization = options.slp_vectorization = False
+        options.loop_vectorization = options.slp_vectorization = vectorised
         builder = llvm_binding().create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)
         module.verify()
@@ -137,7 +134,7 @@ def compile_kernel(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list
         modules = [llvm_binding().parse_bitcode(code) for _ in cpus]
         pairs = zip(cpus, modules, strict=True)
         return [
-            emit_object(module, target_machine(cpu, system or target_triple()), OPTIMIZATION_LEVEL)
+            emit_object(module, target_machine(cpu, system or target_triple()), OPTIMIZATION_LEVEL, kernel.vectorised)
             for cpu, module in pairs
         ]
 

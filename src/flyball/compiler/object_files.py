@@ -184,7 +184,9 @@ def file_name(kernel: Any, cpu: str) -> str:
 def content_key(kernel: Any, cpu: str) -> str:
     """Hash of everything a kernel's code depends on."""
     layouts = ", ".join(str(x) for x in kernel.parameters)
-    text = f"{kernel.name} {kernel.first_order} ({layouts}) {target_triple()} {cpu} {kernel.content}"
+    text = (
+        f"{kernel.name} {kernel.first_order} {kernel.vectorised} ({layouts}) {target_triple()} {cpu} {kernel.content}"
+    )
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 

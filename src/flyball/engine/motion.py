@@ -335,7 +335,7 @@ def derivative(t, y, dy, S, W):
     v = p[nq : nq + W.velocities.solved.shape[0]]
     z = p[nq + W.velocities.solved.shape[0] :]
     set_prescribed(S, W, t, q, v)
-    factored = FACTOR_OLD
+    factored = FACTOR_CURRENT if W.options.factored > 0.0 else FACTOR_OLD
     if W.options.stabilization >= STAGES:
         status, _, factored = project_state(
             S, W, t, q, v, z, W.options.position_tolerance, W.options.velocity_tolerance

@@ -14,7 +14,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ..compiler.formulas import formula
-from ..laws.bytecode import evaluate, evaluate_jet, may_be_brief
+from ..laws.bytecode import SENSOR, evaluate, evaluate_jet, may_be_brief
 from ..math.scalar import cos
 from ..numerics.integrators.time_loop import (
     AT_END,
@@ -239,8 +239,7 @@ def sample_law(S, W, k, law, t, h, x, buffer):
     """Value of a law at fraction x of the step; for a driver's law the second derivative, which requires force."""
     nm = count_measured(S)
     s = t + x * h
-    for m in range(nm):
-        buffer[INPUTS_WITHIN, m], buffer[INPUTS_WITHIN, nm + m] = input_within(buffer, m, x, h)
+    store_sensors_within(S, law, x, h, nm, buffer)
     made = W.generated[SAMPLED]
     if k >= LAWS * S.forces.F.shape[0]:
         if made != 0:
@@ -269,6 +268,18 @@ def sample_law(S, W, k, law, t, h, x, buffer):
             buffer[INPUTS_WITHIN],
         )
     return evaluate(S.code, S.const, law, W.stack, (s, a, b), buffer)
+
+
+@formula
+def store_sensors_within(S, law, x, h, nm, buffer):
+    """Store the sensors that a law reads, of ``nm`` measured quantities and their rates, at fraction x of the step."""
+    for i in range(law + 2, law + 2 + 2 * S.code[law], 2):
+        if S.code[i] == SENSOR:
+            m = S.code[i + 1]
+            if m < nm:
+                buffer[INPUTS_WITHIN, m] = input_within(buffer, m, x, h)[0]
+            elif m < 2 * nm:
+                buffer[INPUTS_WITHIN, m] = input_within(buffer, m - nm, x, h)[1]
 
 
 @formula

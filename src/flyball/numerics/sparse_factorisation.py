@@ -116,12 +116,24 @@ def add_columns(a, l, b):
 
 
 @formula
+def is_zero_row(a):
+    """Whether all `COLUMNS` entries are zero."""
+    return (a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0 and a[3] == 0.0 and a[4] == 0.0 and a[5] == 0.0
+            and a[6] == 0.0 and a[7] == 0.0)  # fmt: skip
+
+
+@formula
 def ldl_solve_columns(P, L, D, x):
-    """Solve for `COLUMNS` right-hand sides (n, COLUMNS) in place; x is in the factored order."""
+    """Solve for `COLUMNS` right-hand sides (n, COLUMNS) in place; x is in the factored order.
+
+    Rows that are zero in all columns are skipped on the way forward: right-hand sides have few entries.
+    """
     n, Lp, Li = P.perm.shape[0], P.Lp, P.Li
     zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(n):
         v = load_columns(x, k)
+        if is_zero_row(v):
+            continue
         for p in range(Lp[k], Lp[k + 1]):
             store_columns(x, Li[p], add_columns(load_columns(x, Li[p]), -L[p], v))
     for k in range(n - 1, -1, -1):

@@ -403,6 +403,7 @@ class Options(Record, kind="Float"):
     partitioned: float  # whether solves are for the dependent coordinates only
     deferred: float  # whether accelerations at output times are computed only when needed
     placed: float  # whether only positions and velocities are needed
+    factored: float  # whether the factor is of the positions at which accelerations are evaluated next
     rate: float  # characteristic rate [1/s]: that of the tables, or one per duration of the motion
 
 

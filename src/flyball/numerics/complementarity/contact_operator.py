@@ -69,6 +69,36 @@ def to_world_frame(P, c, n, s, t):
 
 
 @formula
+def find_columns(P, e, n, rows):
+    """List the columns that are not zero of the block of J at e, of ``rows`` rows of a group of n velocities.
+
+    They are the velocities of the bodies that carry the contact or line, few of a large group.
+    """
+    many = 0
+    for k in range(n):
+        used = False
+        for r in range(rows):
+            used = used or P.J[e + r * n + k] != 0.0
+        if used:
+            P.columns[e + many] = k
+            many += 1
+    if many < n:
+        P.columns[e + many] = -1
+
+
+@formula
+def row_product(P, e, n, row, x, first):
+    """Product of the row of J at ``row``, of the block at e, and n numbers of x from ``first`` on."""
+    s = 0.0
+    for i in range(n):
+        k = P.columns[e + i]
+        if k < 0:
+            break
+        s += P.J[row + k] * x[first + k]
+    return s
+
+
+@formula
 def group_velocity(P, wide, c, first):
     """Contribution of the groups to three velocities of a contact: rows ``first`` and following of J."""
     x, y, z = 0.0, 0.0, 0.0
@@ -77,13 +107,15 @@ def group_velocity(P, wide, c, first):
         if P.at[c, side] < FIXED_SIDE and e >= 0:
             g = -2 - P.at[c, side]
             w, n = P.group[g], P.group[g + 1] - P.group[g]
-            e += first * n
-            sign = 2.0 * side - 1.0
-            for k in range(n):
-                a = sign * wide[w + k]
-                x += P.J[e + k] * a
-                y += P.J[e + n + k] * a
-                z += P.J[e + 2 * n + k] * a
+            J, v, columns = P.J[e + first * n : e + (first + 3) * n], wide[w : w + n], P.columns[e : e + n]
+            for i in range(n):
+                k = columns[i]
+                if k < 0:
+                    break
+                a = v[k] if side == 1 else -v[k]
+                x += J[k] * a
+                y += J[n + k] * a
+                z += J[2 * n + k] * a
     return x, y, z
 
 
@@ -186,10 +218,7 @@ def apply_torque_impulse(P, v, wide, c, p):
 def line_velocity(P, wide, k):
     """J v of line k, without bias and compliance."""
     g, e = P.line_at[k, 0], P.line_at[k, 1]
-    w, u = P.group[g], 0.0
-    for s in range(P.group[g + 1] - w):
-        u += P.J[e + s] * wide[w + s]
-    return u
+    return row_product(P, e, P.group[g + 1] - P.group[g], e, wide, P.group[g])
 
 
 @formula
@@ -203,10 +232,8 @@ def apply_line_impulse(P, wide, k, p):
 @formula
 def line_diagonal(P, k):
     """Velocity of line k for its own unit impulse, compliance included."""
-    g, e, u = P.line_at[k, 0], P.line_at[k, 1], P.line_law.soft[k]
-    for s in range(P.group[g + 1] - P.group[g]):
-        u += P.J[e + s] * P.Y[e + s]
-    return u
+    g, e = P.line_at[k, 0], P.line_at[k, 1]
+    return P.line_law.soft[k] + row_product(P, e, P.group[g + 1] - P.group[g], e, P.Y, e)
 
 
 @formula
@@ -238,11 +265,14 @@ def add_blocks(a, b):
 @formula
 def group_block(P, c, side, first):
     """Diagonal block of three rows of J and Y."""
-    g, e = -2 - P.at[c, side], P.block[c, side]
+    g, block = -2 - P.at[c, side], P.block[c, side]
     n = P.group[g + 1] - P.group[g]
-    e += first * n
+    e = block + first * n
     nn, ns, nt, ss, st, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(n):
+    for i in range(n):
+        k = P.columns[block + i]
+        if k < 0:
+            break
         x, y, z = P.Y[e + k], P.Y[e + n + k], P.Y[e + 2 * n + k]
         nn += P.J[e + k] * x
         ns += P.J[e + k] * y

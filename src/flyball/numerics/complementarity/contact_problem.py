@@ -50,6 +50,7 @@ class ContactProblem(NamedTuple):
     block: Int2  # (nc, 2): first number of J and Y of a side that is in a group, or -1
     J: Float1
     Y: Float1
+    columns: Int1  # from the first number of each block of J: its columns that are not zero, -1 after the last
     line_at: Int2  # (nl, 2): group, first number of its J and Y (n numbers each)
     line_law: LineLaws
     island: Int1  # (ni + 1,): first contact of each island; one island by default
@@ -176,8 +177,6 @@ class ContactWorkspace(NamedTuple):
     inner: Float2  # (nn + 1, 8): inverse inertia block of each node, two unused
     free: Float2  # (nn + 1, 8): v, w without impulses, two unused
     free_wide: Float1  # velocities of the groups without impulses
-    group_columns: Int1  # as J: from the start of each block of a group, its columns that are not zero
-    group_column_count: Int2  # (nc, 2): their number on each side
     contact_nodes: Int2  # (nc, 3): in the order of sweeps the two nodes in ``node_state`` and the number of the contact
     spheres: SphereContacts  # (nc): contacts in that order, each in the table of its kind
     frictionless: FrictionlessContacts  # (nc)
@@ -229,6 +228,7 @@ def empty_problem(
         block=np.full((nc, 2), -1, whole),
         J=np.zeros(numbers),
         Y=np.zeros(numbers),
+        columns=np.zeros(numbers, whole),
         line_at=np.zeros((lines, 2), whole),
         line_law=LineLaws.blank(lines),
         island=ends(nc),
@@ -270,8 +270,6 @@ def allocate_solver(
         inner=cache_aligned(nn + 1, 8),
         free=cache_aligned(nn + 1, 8),
         free_wide=np.zeros(nw),
-        group_columns=np.zeros(len(P.J), np.int64),
-        group_column_count=np.zeros((nc, 2), np.int64),
         contact_nodes=np.zeros((nc, 3), np.int64),
         spheres=cache_aligned(nc, SphereContacts.layout.width).view(SphereContacts),
         frictionless=cache_aligned(nc, FrictionlessContacts.layout.width).view(FrictionlessContacts),

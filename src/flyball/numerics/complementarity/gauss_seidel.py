@@ -13,7 +13,7 @@ all: p' N p / 2 + b' p is never positive, so that no energy is generated.
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from ...compiler.kernels import kernel
+from ...compiler.kernels import vectorised_kernel
 from ...math.scalar import sqrt
 from .cone_projection import fraction_within, project_on_cone_above, rolling_cone_normal
 from .contact_operator import (
@@ -26,18 +26,17 @@ from .contact_operator import (
     contact_angular_velocity,
     contact_range,
     contact_terms,
+    contact_velocity,
     finish_solve,
     line_diagonal,
     line_range,
     line_velocity,
     node_range,
-    node_velocity,
     residual_summary,
     rolling_diagonal_block,
 )
 from .contact_problem import (
     CONVERGED,
-    FIXED_SIDE,
     LIMIT_REACHED,
     ContactProblem,
     ContactSolution,
@@ -67,40 +66,6 @@ from .packed_contacts import (
 
 
 @formula
-def find_group_columns(P, W, c):
-    """List the columns of a contact's blocks that are not zero: those of the bodies that carry it, few of a group."""
-    for side in range(2):
-        e, many = P.block[c, side], 0
-        if P.at[c, side] < FIXED_SIDE and e >= 0:
-            g = -2 - P.at[c, side]
-            n = P.group[g + 1] - P.group[g]
-            for k in range(n):
-                if P.J[e + k] != 0.0 or P.J[e + n + k] != 0.0 or P.J[e + 2 * n + k] != 0.0:
-                    W.group_columns[e + many] = k
-                    many += 1
-        W.group_column_count[c, side] = many
-
-
-@formula
-def general_velocity(P, X, W, c):
-    """Return `contact_velocity`, by the columns of J that are not zero."""
-    x, y, z = node_velocity(P, W.node_state, c)
-    for side in range(2):
-        many, e = W.group_column_count[c, side], P.block[c, side]
-        if many > 0:
-            g = -2 - P.at[c, side]
-            w, n = P.group[g], P.group[g + 1] - P.group[g]
-            J, wide, columns = P.J[e : e + 3 * n], X.wide[w : w + n], W.group_columns[e : e + many]
-            for i in range(many):
-                k = columns[i]
-                a = wide[k] if side == 1 else -wide[k]
-                x += J[k] * a
-                y += J[n + k] * a
-                z += J[2 * n + k] * a
-    return x, y, z
-
-
-@formula
 def update_general(P, X, W, O, c, at):
     """Update a contact of nodes and groups."""
     k = W.frictional
@@ -108,7 +73,7 @@ def update_general(P, X, W, O, c, at):
     if P.turn.shape[0] > 0:
         update_rolling(P, X, W, O, c, at)
     else:
-        q = local_impulse(k, at, general_velocity(P, X, W, c), O.count.coulomb)
+        q = local_impulse(k, at, contact_velocity(P, W.node_state, X.wide, c), O.count.coulomb)
         set_impulse(P, X, W, c, at, q)
     d = abs(k.impulse[at, 0] - n) + abs(k.impulse[at, 1] - s) + abs(k.impulse[at, 2] - t)
     return d / k.inverse_nn[at] if d > 0.0 else 0.0
@@ -141,7 +106,7 @@ def update_rolling(P, X, W, O, c, at):
     """
     steps = local_step_sizes(rolling_diagonal_block(P, c), 0.0, 0)
     spin, roll = steps[0], steps[6]
-    u = general_velocity(P, X, W, c)
+    u = contact_velocity(P, W.node_state, X.wide, c)
     if O.count.coulomb:
         set_impulse(P, X, W, c, at, local_impulse(W.frictional, at, u, 1))
         n = W.frictional.impulse[at, 0]
@@ -400,15 +365,13 @@ def prepare_sweeps(P, X, W, O):
         W.free_wide[k] = X.wide[k]
     many = count_contact_kinds(P, W, first, last, 0)
     pack_contacts(P, X, W, O.count.coulomb, first, many)
-    for c in range(first, last):
-        find_group_columns(P, W, c)
     begin, end = line_range(P, O)
     for k in range(begin, end):
         apply_line_impulse(P, X.wide, k, X.line[k])
     return many
 
 
-@kernel
+@vectorised_kernel
 def gauss_seidel(
     P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:

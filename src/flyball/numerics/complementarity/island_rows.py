@@ -21,6 +21,7 @@ from typing import NamedTuple
 from ...compiler.formulas import by_address, formula
 from ...compiler.struct_layout import Float1, Int1
 from ...math.scalar import sqrt
+from .contact_operator import row_product
 from .contact_problem import FIXED_SIDE, STORAGE_TOO_SMALL
 
 # entries of IslandRows.size
@@ -231,12 +232,13 @@ def fill_node_entry(P, c, s, turning, root, G, e):
 
 @formula
 def side_rows(P, span, t):
-    """First number of J and Y of a side in a chain, and its number of scalar rows."""
+    """Start of the block of a side in a chain, the first number of its rows in J and Y, and its number of rows."""
     c, k = row_subject(span, t // 2)
     if c < 0:
-        return P.line_at[k, 1], 1
+        return P.line_at[k, 1], P.line_at[k, 1], 1
     g = -2 - P.at[c, t % 2]
-    return P.block[c, t % 2] + (3 * (P.group[g + 1] - P.group[g]) if k == -2 else 0), 3
+    e = P.block[c, t % 2]
+    return e, e + (3 * (P.group[g + 1] - P.group[g]) if k == -2 else 0), 3
 
 
 @formula
@@ -245,7 +247,7 @@ def most_mobile_row(P, span, R, g, D):
     nn, ng = P.size[1], P.size[2]
     t, best, side, which, left = R.head[nn + 2 * ng + g], RANK_TOLERANCE, -1, 0, 0.0
     while t >= 0:
-        many = side_rows(P, span, t)[1]
+        many = side_rows(P, span, t)[2]
         for r in range(many):
             d, whole = D[6 * t + r], D[6 * t + 3 + r]
             if whole > 0.0 and d > best * whole:
@@ -262,12 +264,10 @@ def group_mobilities(P, span, R, g, D):
     for again in range(2):
         t = R.head[nn + 2 * ng + g]
         while t >= 0:
-            at, many = side_rows(P, span, t)
+            e, at, many = side_rows(P, span, t)
             for r in range(many):
                 if again == 0:
-                    d = 0.0
-                    for k in range(n):
-                        d += P.J[at + r * n + k] * P.Y[at + r * n + k]
+                    d = row_product(P, e, n, at + r * n, P.Y, at + r * n)
                     D[6 * t + r] = d
                     largest = max(largest, d)
                 else:
@@ -285,18 +285,15 @@ def fill_group_entries(P, span, R, g, D):
         side, which, left = most_mobile_row(P, span, R, g, D)
         if side < 0:
             return
-        at = side_rows(P, span, side)[0] + which * n
+        at = side_rows(P, span, side)[1] + which * n
         scale = 1.0 / sqrt(left)
         t = R.head[nn + 2 * ng + g]
         own = 18 * R.side[side] + 6 * which
         while t >= 0:
-            other, many = side_rows(P, span, t)
+            e, other, many = side_rows(P, span, t)
             sign = 1.0 if t % 2 == side % 2 else -1.0
             for r in range(many):
-                x = 0.0
-                for j in range(n):
-                    x += P.J[other + r * n + j] * P.Y[at + j]
-                x *= sign
+                x = sign * row_product(P, e, n, other + r * n, P.Y, at)
                 o = 18 * R.side[t] + 6 * r
                 for j in range(k):
                     x -= R.G[o + 18 * (j // 6) + j % 6] * R.G[own + 18 * (j // 6) + j % 6]

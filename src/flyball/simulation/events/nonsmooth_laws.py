@@ -22,7 +22,7 @@ from ...engine.mode_complementarity import RATE_ROUNDING, VELOCITY_ROUNDING
 from ...engine.motion import corner_rates
 from ...engine.rows import count_measured
 from ...errors import SimulationError
-from ...laws.bytecode import BY_MOTION, BY_TIME, evaluate_jet
+from ...laws.bytecode import BY_MOTION, BY_TIME, SENSOR, evaluate_jet
 from ...results.events import EventRecord
 from .impacts import LOW_FLIGHT
 from .instant_problem import RATE_TOLERANCE, InstantProblem
@@ -61,17 +61,24 @@ def corner_derivatives(n: InstantProblem, s: int, seed: int) -> tuple[float, flo
     return evaluate_jet(n.S.code, n.S.const, law, n.W.stack, n.here.t, n.W.sensed, seed)
 
 
+def measured_inputs(n: InstantProblem, s: int) -> list[int]:
+    """Return the measured quantities (their rates behind them) that the argument of the corner of switch s reads."""
+    code, at = n.S.code, int(n.S.switches.law[s])
+    program = code[at + 2 : at + 2 + 2 * code[at]].reshape(-1, 2)
+    read = np.unique(program[program[:, 0] == SENSOR, 1])
+    return [int(m) for m in read[read < 2 * count_measured(n.S)]]
+
+
 def corner_at(n: InstantProblem, s: int) -> CornerFunction:
     """Return the corner of switch s."""
     S, W, v = n.S, n.W, n.here.v
     nm, nr = count_measured(S), len(S.rows.law)
     terms, rows = n.here.structure.terms, len(n.here.structure.rows)
     measures = {x.row - rows: x.formula.measure for x in terms if x.measured}
-    slopes = np.array([corner_derivatives(n, s, m)[1] for m in range(2 * nm)])
-    rates = bool(slopes[nm:].any())
+    slopes = {m: corner_derivatives(n, s, m)[1] for m in measured_inputs(n, s)}
+    rates = any(slope != 0.0 for m, slope in slopes.items() if m >= nm)
     row, size, still = np.zeros(n.here.structure.nv), 0.0, 0.0
-    for m in range(nm):
-        slope = slopes[nm + m] if rates else slopes[m]
+    for m, slope in ((m - nm if rates else m, slope) for m, slope in slopes.items() if (m >= nm) == rates):
         unit = n.here.c.values.length if measures.get(m) == "m" else 1.0
         at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])
         G = np.abs(W.G[at])
@@ -270,7 +277,7 @@ class Corners:
         """Return u of a corner at the state last evaluated, and its rounding."""
         S, W, t = self.n.S, self.n.W, self.n.here.t
         size = abs(t * corner_derivatives(self.n, s, BY_TIME)[1])
-        for m in range(2 * count_measured(S)):
+        for m in measured_inputs(self.n, s):
             size += abs(W.sensed.value[m] * corner_derivatives(self.n, s, m)[1])
         return float(corner_value(S, W, t, s)), CORNER_ROUNDING * float(size)
 

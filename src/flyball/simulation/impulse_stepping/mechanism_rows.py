@@ -7,7 +7,8 @@ Rows belong to its contacts; single rows to stops, ropes and joint friction:
 - Friction: bounded by its own law, at the load that follows from the reactions of the last step.
 
 The response to a row's impulse is one solve with the factor of the joints, for several rows at once. Groups are
-independent of each other, so that one solve gives the response of a row of each group.
+independent of each other, so that one solve gives the response of a row of each group. The factor is that of the last
+evaluation, at the same positions.
 
 Springs and dampers are treated implicitly, as a low-rank addition to the mass matrix. A force s along J v, with
 stiffness k and damping c, is taken at
@@ -32,10 +33,11 @@ from ...engine.calls import POSITION, SLOPES, SOLVE
 from ...engine.kinematics import load_record, project_wrench, retract
 from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
 from ...engine.residual import DAMPING, DIRECTIONS, STIFFNESS, probe_direction
-from ...engine.solve import apply_inverse_mass, factor_schur
+from ...engine.solve import apply_inverse_mass
 from ...math.rotation import rotation_vector
 from ...math.scalar import sqrt
 from ...math.vec import add, col, dot, load3, mm, norm, sub, transpose
+from ...numerics.complementarity.contact_operator import find_columns, row_product
 from ...numerics.complementarity.contact_problem import FIXED_SIDE
 from ...numerics.sparse_factorisation import COLUMNS, add_columns, ldl_solve_columns, load_columns, store_columns
 from ...tables.table_definitions import SCHUR, STEP
@@ -104,46 +106,98 @@ def find_implicit_springs(A, h):
     if S.forces.F.shape[0] == 0:
         return
     call(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
-    found = A.slopes.rows
-    used = 0
+    found, x = A.slopes.rows, A.springs
+    some, used = 0, 0
     for k in range(S.forces.F.shape[0]):
         n = max(1, int(found[k, DIRECTIONS]))
         for i in range(n):
             stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
-            if stiffness + damping > 0.0 and add_spring(A, h, used, (k, n, i), stiffness, damping):
-                A.springs.force[used] = k
-                A.springs.directions[used], A.springs.direction[used] = n, i
-                used += 1
+            if stiffness + damping > 0.0 and may_be_stiff(A, some, (k, n, i), h * (h * stiffness + damping)):
+                x.stiffness[some], x.damping[some], x.force[some] = stiffness, damping, k
+                x.directions[some], x.direction[some] = n, i
+                some += 1
+    spring_responses(A, some)
+    for n in range(some):
+        if keep_spring(A, h, n, used):
+            used += 1
     A.count.springs = used
     factor_springs(A)
 
 
 @formula
-def add_spring(A, h, n, which, stiffness, damping):
-    """Write a spring into row n of the tables. Returns whether it is stiff enough to be kept."""
-    J, Y, x = A.spring_J[n], A.spring_Y[n], A.springs
+def may_be_stiff(A, n, which, added):
+    """Write the gradient of a spring to row n. Returns whether it is stiff without joints, which only stiffen bodies.
+
+    ``added``: h^2 k + h c.
+    """
+    J, Y = A.spring_J[n], A.spring_Y[n]
     spring_gradient(A.S, A.W, which[0], which[1], which[2], J)
-    z = h * (h * stiffness + damping)
-    if A.S.sizes.solver == SCHUR:  # joints never increase the response
-        for b in range(A.S.tree.parent.shape[0]):
-            apply_inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
-        if z * dot_rows(J, Y) < SOFT_SPRING:
-            return False
-    impulse_response(A, J, Y)
-    z *= dot_rows(J, Y)
+    if A.S.sizes.solver != SCHUR:
+        return True
+    for b in range(A.S.tree.parent.shape[0]):
+        apply_inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
+    return added * dot_rows(J, Y) >= SOFT_SPRING
+
+
+@formula
+def spring_responses(A, count):
+    """Compute the responses to the first ``count`` springs, `COLUMNS` at once where joints are solved so."""
+    if not is_solved_by_schur(A):
+        for n in range(count):
+            impulse_response(A, A.spring_J[n], A.spring_Y[n])
+        return
+    nv = A.response.shape[0]
+    for begin in range(0, count, COLUMNS):
+        many = min(COLUMNS, count - begin)
+        clear_columns(A)
+        for c in range(many):
+            load_column(A, A.spring_J[begin + c], 0, (0, nv), c)
+        solve_columns(A)
+        for d in range(nv):
+            for c in range(many):
+                A.spring_Y[begin + c, d] = A.response[d, c]
+
+
+@formula
+def keep_spring(A, h, n, to):
+    """Move spring n to row ``to`` of the tables, if it is stiff enough. Returns whether it is."""
+    x, J, Y = A.springs, A.spring_J[to], A.spring_Y[to]
+    z = h * (h * x.stiffness[n] + x.damping[n]) * dot_rows(A.spring_J[n], A.spring_Y[n])
     if z < SOFT_SPRING:
         return False
+    if to != n:
+        for k in range(x.shape[1]):
+            x[to, k] = x[n, k]
+        for d in range(J.shape[0]):
+            J[d], Y[d] = A.spring_J[n, d], A.spring_Y[n, d]
     y = (0.25 * z) * (0.25 * z)
     share = y / (1.0 + y)
-    x.stiffness[n], x.damping[n], x.implicit_share[n] = stiffness, damping, share
-    x.added_mass[n] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
+    x.implicit_share[to] = share
+    x.added_mass[to] = h * h * x.stiffness[to] * (0.25 + 0.75 * share) + h * x.damping[to] * (0.5 + 0.5 * share)
     d = 0
     while J[d] == 0.0:
         d += 1
     for g in range(A.queue.shape[0]):
         if A.group[g] <= d < A.group[g + 1]:
-            x.first[n], x.end[n] = A.group[g], A.group[g + 1]
+            x.first[to], x.end[to] = A.group[g], A.group[g + 1]
     return True
+
+
+@formula
+def spring_rate(A, i, v):
+    """Return the rate of the length of spring i at velocities v."""
+    s, J = 0.0, A.spring_J[i]
+    for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
+        s += J[d] * v[d]
+    return s
+
+
+@formula
+def add_spring_response(A, i, impulse, x):
+    """Add the response to an impulse along spring i, without springs, to x."""
+    Y = A.spring_Y[i]
+    for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
+        x[d] += impulse * Y[d]
 
 
 @formula
@@ -152,7 +206,7 @@ def factor_springs(A):
     C = A.stiff
     for i in range(A.count.springs):
         for j in range(i + 1):
-            s = dot_rows(A.spring_J[i], A.spring_Y[j])
+            s = spring_rate(A, i, A.spring_Y[j])
             if i == j:
                 s += 1.0 / A.springs.added_mass[i]
             for k in range(j):
@@ -165,11 +219,10 @@ def with_spring_response(A, x):
     """Change a response without springs to one with them, in place."""
     n, t = A.count.springs, A.springs
     for i in range(n):
-        t.solution[i] = dot_rows(A.spring_J[i], x)
+        t.solution[i] = spring_rate(A, i, x)
     solve_springs(A)
     for i in range(n):
-        for d in range(x.shape[0]):
-            x[d] -= t.solution[i] * A.spring_Y[i, d]
+        add_spring_response(A, i, -t.solution[i], x)
 
 
 @formula
@@ -180,7 +233,8 @@ def columns_with_spring_response(A):
     for i in range(n):
         s, J = zero, A.spring_J[i]
         for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
-            s = add_columns(s, J[d], load_columns(x, d))
+            if J[d] != 0.0:
+                s = add_columns(s, J[d], load_columns(x, d))
         for k in range(i):
             s = add_columns(s, -C[i, k], load_columns(t, k))
         store_columns(t, i, add_columns(zero, 1.0 / C[i, i], s))
@@ -215,7 +269,7 @@ def spring_impulse(A, h, i, before, change):
     """Return the impulse of spring i beyond that of the force at half the step, for this change of velocities."""
     x = A.springs
     b, bend = x.implicit_share[i], h * x.bias[i]
-    r, dr = dot_rows(A.spring_J[i], before) - 0.5 * bend, dot_rows(A.spring_J[i], change) + bend
+    r, dr = spring_rate(A, i, before) - 0.5 * bend, spring_rate(A, i, change) + bend
     return h * h * x.stiffness[i] * (b * (r - 0.125 * bend) + (0.25 + 0.75 * b) * dr) + 0.5 * h * x.damping[i] * b * dr
 
 
@@ -305,7 +359,7 @@ def correct_spring_lengths(A):
         worst = 0.0
         for i in range(A.count.springs):
             x = A.springs
-            told = x.length[i] + dot_rows(A.spring_J[i], A.velocities.displacement) + 0.125 * h * h * x.bias[i]
+            told = x.length[i] + spring_rate(A, i, A.velocities.displacement) + 0.125 * h * h * x.bias[i]
             x.solution[i] = spring_length(A, i) - told
             worst = max(worst, abs(x.solution[i]) / (length_unit(A, i) + abs(told)))
         if not LENGTH_TOLERANCE < worst < 1.0:
@@ -314,8 +368,7 @@ def correct_spring_lengths(A):
         for d in range(step.shape[0]):
             step[d] = 0.0
         for i in range(A.count.springs):
-            for d in range(step.shape[0]):
-                step[d] -= A.springs.solution[i] * A.spring_Y[i, d]
+            add_spring_response(A, i, -A.springs.solution[i], step)
         retract(A.S, q, step)
 
 
@@ -404,6 +457,7 @@ def line_row(A, P, k, g, where):
     r = A.S.rows.law.shape[0] + A.line.quantity[k]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         P.J[at + A.S.column[e] - A.group[g]] += lever * A.W.G[e]
+    find_columns(P, at, size, 1)
 
 
 @formula
@@ -433,9 +487,7 @@ def friction_law(A, P, i, k, x):
     """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
     h, lever = A.real.step, line_lever(A, k)
     g, at = A.active.group[i], A.active.first[i]
-    w = 0.0
-    for d in range(A.group[g + 1] - A.group[g]):
-        w += P.J[at + d] * P.Y[at + d]
+    w = row_product(P, at, A.group[g + 1] - A.group[g], at, P.Y, at)
     t, arm, load = A.real.time + 0.5 * h, A.line_law.arm[k], A.line_law.load[k]
     rate = line_rate(A, k, A.velocities.before)
     held = h * static_friction_limit(A.S, A.W, A.line.force[k], t, arm, load)
@@ -452,9 +504,7 @@ def rope_law(A, P, i, k, x):
     h = A.real.step
     K, C = A.line_law.stiffness[k], A.line_law.damping[k]
     g, at = A.active.group[i], A.active.first[i]
-    w = 0.0
-    for d in range(A.group[g + 1] - A.group[g]):
-        w += P.J[at + d] * P.Y[at + d]
+    w = row_product(P, at, A.group[g + 1] - A.group[g], at, P.Y, at)
     z = 0.25 * h * (h * K + C) * w
     b = z * z / (1.0 + z * z)
     added = h * h * K * (0.25 + 0.75 * b) + h * C * (0.5 + 0.5 * b)
@@ -558,6 +608,7 @@ def mechanism_contact_rows(A, M, C, P):
                 jobs += 1
             point = add(load3(A.W.bodies.position, b, 0), load3(P.arm, c, 3 * side))
             side_rows(A, P, c, (b, at - A.group[g], n), point, rows)
+            find_columns(P, at, n, rows)
             P.block[c, side], P.at[c, side] = at, -2 - g
             last = g
     line_rows(A, P, used, jobs, True)
@@ -608,18 +659,15 @@ def side_rows(A, P, c, where, point, rows):
 def row_responses(A, P):
     """Compute the responses Y to all queued rows, `COLUMNS` at once, with one row of each group in a column."""
     schur = is_solved_by_schur(A)
-    if schur:
-        factor_schur(A.S, A.W)
     for g in range(A.queue.shape[0]):
         A.queued_row[g] = 0
-    columns = queue_columns(A, P)
+    columns = queue_columns(A, P, schur)
     while columns > 0:
         if schur:
             solve_columns(A)
         columns_with_spring_response(A)
-        for c in range(columns):
-            read_responses(A, P, c)
-        columns = queue_columns(A, P)
+        read_responses(A, P, columns)
+        columns = queue_columns(A, P, schur)
 
 
 @formula
@@ -629,33 +677,55 @@ def is_solved_by_schur(A):
 
 
 @formula
-def queue_columns(A, P):
+def clear_columns(A):
+    """Set all columns of ``A.response`` to zero."""
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for d in range(A.response.shape[0]):
+        store_columns(A.response, d, zero)
+    for b in range(A.loaded.shape[0]):
+        A.loaded[b] = 0
+
+
+@formula
+def load_column(A, J, at, span, c):
+    """Write M^-1 J' of a row over the velocities of ``span`` to column c; the row begins at J[at]."""
+    S, out = A.S, A.velocities.impulsive
+    for b in range(S.tree.parent.shape[0]):
+        v, n = S.tree.v[b], S.tree.nv[b]
+        if span[0] <= v < span[1]:
+            own, used = at + v - span[0], False
+            for i in range(n):
+                used = used or J[own + i] != 0.0
+            if used:
+                A.loaded[b] = 1
+                apply_inverse_mass(S, b, J, own, out, v)
+                for i in range(n):
+                    A.response[v + i, c] = out[v + i]
+
+
+@formula
+def queue_columns(A, P, schur):
     """Take the next rows of all groups, and fill the columns with their responses, of `solve_columns` without joints.
 
     Returns the number of columns.
     """
-    columns = 0
-    while columns < COLUMNS:
+    clear_columns(A)
+    for columns in range(COLUMNS):
         used = False
         for g in range(A.queue.shape[0]):
-            A.column[g, columns] = next_row(A, P, g)
-            used = used or A.column[g, columns] >= 0
+            at = next_row(A, P, g)
+            A.column[g, columns] = at
+            used = used or at >= 0
+            if schur and at >= 0:
+                load_column(A, P.J, at, (A.group[g], A.group[g + 1]), columns)
         if not used:
-            break
-        fill_impulses(A, P, columns)
-        if is_solved_by_schur(A):
-            for b in range(A.S.tree.parent.shape[0]):
-                d = A.S.tree.v[b]
-                apply_inverse_mass(A.S, b, A.velocities.impulse, d, A.velocities.impulsive, d)
-        else:
+            return columns
+        if not schur:
+            fill_impulses(A, P, columns)
             impulse_response(A, A.velocities.impulse, A.velocities.impulsive)
-        for d in range(A.response.shape[0]):
-            A.response[d, columns] = A.velocities.impulsive[d]
-        columns += 1
-    for c in range(columns, COLUMNS):
-        for d in range(A.response.shape[0]):
-            A.response[d, c] = 0.0
-    return columns
+            for d in range(A.response.shape[0]):
+                A.response[d, columns] = A.velocities.impulsive[d]
+    return COLUMNS
 
 
 @formula
@@ -664,12 +734,15 @@ def next_row(A, P, g):
     n = A.group[g + 1] - A.group[g]
     while A.queue[g] >= 0:
         k = A.queue[g]
-        at = A.job.first[k] + A.queued_row[g] * n
+        block = A.job.first[k]
+        at = block + A.queued_row[g] * n
         A.queued_row[g] += 1
         if A.queued_row[g] == A.job.rows[k]:
             A.queue[g], A.queued_row[g] = A.job.next[k], 0
-        for d in range(n):
-            if P.J[at + d] != 0.0:
+        for i in range(n):
+            if P.columns[block + i] < 0:
+                break
+            if P.J[at + P.columns[block + i]] != 0.0:
                 return at
         for d in range(n):
             P.Y[at + d] = 0.0
@@ -693,12 +766,17 @@ def fill_impulses(A, P, c):
 def solve_columns(A):
     """Change responses without joints to those with joints: x + M^-1 G^T z with G M^-1 G^T z = -G x."""
     x, z, first, column, place = A.response, A.response_impulse, A.S.row_start, A.S.column, A.S.ldl.perm
-    G, H = A.W.G, A.W.H
+    G, H, blocks = A.W.G, A.W.H, A.S.blocks
     for k in range(z.shape[0]):
-        s = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for e in range(first[k], first[k + 1]):
-            s = add_columns(s, -G[e], load_columns(x, column[e]))
-        store_columns(z, place[k], s)
+        store_columns(z, k, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for e in range(blocks.body.shape[0]):
+        b = blocks.body[e]
+        if A.loaded[b] != 0:
+            k, at, v = place[blocks.row[e]], blocks.entry[e], A.S.tree.v[b]
+            s = load_columns(z, k)
+            for i in range(A.S.tree.nv[b]):
+                s = add_columns(s, -G[at + i], load_columns(x, v + i))
+            store_columns(z, k, s)
     ldl_solve_columns(A.S.ldl, A.W.L, A.W.ldl.inverse_diagonal, z)
     for k in range(z.shape[0]):
         s = load_columns(z, place[k])
@@ -707,10 +785,12 @@ def solve_columns(A):
 
 
 @formula
-def read_responses(A, P, c):
-    """Read the responses to the rows in column c."""
+def read_responses(A, P, columns):
+    """Read the responses to the rows in the columns."""
     for g in range(A.queue.shape[0]):
-        at, a = A.column[g, c], A.group[g]
-        if at >= 0:
-            for d in range(A.group[g + 1] - a):
-                P.Y[at + d] = A.response[a + d, c]
+        a = A.group[g]
+        for d in range(A.group[g + 1] - a):
+            for c in range(columns):
+                at = A.column[g, c]
+                if at >= 0:
+                    P.Y[at + d] = A.response[a + d, c]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from ...collision.tables import ContactTable, Movers
 from ...compiler.formulas import call, formula
-from ...compiler.kernels import kernel
+from ...compiler.kernels import vectorised_kernel
 from ...engine.calls import ARRIVE, MOTION, POSITION, SOLVE
 from ...engine.kinematics import retract
 from ...engine.rows import row_times
@@ -23,8 +23,8 @@ from ...numerics.complementarity.contact_problem import ContactProblem, ContactS
 from ...tables.table_definitions import SCHUR
 from .mechanism_rows import (
     account_lines,
+    add_spring_response,
     correct_spring_lengths,
-    dot_rows,
     find_implicit_springs,
     impulse_response,
     keep_stops_only,
@@ -32,6 +32,7 @@ from .mechanism_rows import (
     save_spring_biases,
     save_spring_lengths,
     spring_impulse,
+    spring_rate,
     update_friction_loads,
     with_spring_response,
 )
@@ -127,7 +128,7 @@ def free_velocities(A):
     for n in range(MOST_EVALUATIONS):
         for d in range(nv):
             y[0, nq + d] = before[d] + 0.5 * change[d]
-        status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+        status = evaluate_motion(A, n > 0)
         A.count.evaluated += 1
         if status != 0:
             return status
@@ -143,6 +144,15 @@ def free_velocities(A):
             next_guess(A, n)
     A.count.unsettled += 1
     return 0 if A.count.accept_unsettled != 0 else NOT_CONVERGED
+
+
+@formula
+def evaluate_motion(A, factored):
+    """Evaluate accelerations; ``factored``: at the positions of the last evaluation, whose factor is used again."""
+    A.W.options.factored = 1.0 if factored else 0.0
+    status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+    A.W.options.factored = 0.0
+    return status
 
 
 @formula
@@ -164,8 +174,7 @@ def change_residual(A, h):
         now[d] = A.velocities.smooth[d] - change[d]
     for i in range(A.count.springs):
         s = spring_impulse(A, h, i, A.velocities.before, change)
-        for d in range(now.shape[0]):
-            now[d] -= s * A.spring_Y[i, d]
+        add_spring_response(A, i, -s, now)
     with_spring_response(A, now)
 
 
@@ -372,8 +381,8 @@ def apply_step_impulses(A, P, X):
     contact_impulses(A, P, X, total)
     for i in range(A.count.springs):
         s = spring_impulse(A, h, i, before, A.velocities.change)
-        s += A.springs.added_mass[i] * dot_rows(A.spring_J[i], A.velocities.displacement)
-        for d in range(nv):
+        s += A.springs.added_mass[i] * spring_rate(A, i, A.velocities.displacement)
+        for d in range(int(A.springs.first[i]), int(A.springs.end[i])):
             total[d] -= s * A.spring_J[i, d]
     impulse_response(A, total, A.velocities.impulsive)
     for r in range(A.reactions.smooth.shape[0]):
@@ -412,7 +421,7 @@ def evaluate_at_mean(A, part):
     for d in range(A.velocities.before.shape[0]):
         mean = A.velocities.before[d] + 0.5 * A.velocities.change[d]
         A.clock.y.current[nq + d] = mean + part * A.velocities.impulsive[d]
-    return call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+    return evaluate_motion(A, True)
 
 
 @formula
@@ -433,9 +442,8 @@ def correct_velocity_forces(A, h):
             vdot = A.clock.K[0, A.S.sizes.coordinates + d]
             A.velocities.after[d] += 0.5 * (h * vdot - A.velocities.smooth[d])
         for i in range(A.count.springs):  # their dampers use the velocities after impulses already
-            s = 0.5 * h * A.springs.damping[i] * dot_rows(A.spring_J[i], A.velocities.impulsive)
-            for d in range(A.velocities.before.shape[0]):
-                A.velocities.after[d] += s * A.spring_Y[i, d]
+            s = 0.5 * h * A.springs.damping[i] * spring_rate(A, i, A.velocities.impulsive)
+            add_spring_response(A, i, s, A.velocities.after)
     for i in range(z, y.shape[1]):
         A.clock.K[0, i] = y[2, i]
 
@@ -453,7 +461,10 @@ def contact_impulses(A, P, X, total):
                 sign = 1.0 if side == 1 else -1.0
                 for i in range(6 if P.turn.shape[0] > 0 else 3):
                     s = sign * (X.p[c, i] if i < 3 else X.torque[c, i - 3])
-                    for d in range(n):
+                    for j in range(n):
+                        d = P.columns[at + j]
+                        if d < 0:
+                            break
                         total[a + d] += s * P.J[at + i * n + d]
     for k in range(P.size[3]):
         g, at = P.line_at[k, 0], P.line_at[k, 1]
@@ -484,9 +495,7 @@ def account_works(A, h):
     for i in range(A.count.springs):
         k = int(A.springs.force[i])
         if S.forces.work[k] >= 0:
-            rate = dot_rows(A.spring_J[i], A.velocities.before) + 0.5 * dot_rows(
-                A.spring_J[i], A.velocities.displacement
-            )
+            rate = spring_rate(A, i, A.velocities.before) + 0.5 * spring_rate(A, i, A.velocities.displacement)
             work[S.forces.work[k]] -= spring_impulse(A, h, i, A.velocities.before, A.velocities.displacement) / h * rate
 
 
@@ -540,7 +549,7 @@ def finish_step(A, M, X):
     return 0
 
 
-@kernel
+@vectorised_kernel
 def mechanism_kernel(
     A: MechanismTables, M: Movers, C: ContactTable, P: ContactProblem, X: ContactSolution, task: int
 ) -> int:

@@ -295,7 +295,7 @@ def mechanism_tables(
         job=Jobs.blank(0), queue=np.zeros(len(group) - 1, np.int64),
         queued_row=np.zeros(len(group) - 1, np.int64), column=np.zeros((len(group) - 1, COLUMNS), np.int64),
         response=np.zeros((s.nv, COLUMNS)), response_impulse=np.zeros((len(S.rows.law), COLUMNS)),
-        spring_response=np.zeros((springs, COLUMNS)),
+        spring_response=np.zeros((springs, COLUMNS)), loaded=np.zeros(len(S.tree.parent), np.int64),
         pose=np.zeros((len(rows), 12)),
     )  # fmt: skip
     A.count.first = first

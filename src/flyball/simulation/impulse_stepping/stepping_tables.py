@@ -341,6 +341,7 @@ class MechanismTables(NamedTuple):
     response: Float2  # (nv, COLUMNS): responses that are computed together
     response_impulse: Float2  # (nr, COLUMNS): impulses of the joints in them
     spring_response: Float2  # (springs, COLUMNS): impulses of the springs in them
+    loaded: Int1  # (bodies,): whether an impulse acts on a body in some column
     pose: Float2  # (movers, 12): before the projection onto the joints
 
 
