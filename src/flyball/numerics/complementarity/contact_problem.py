@@ -31,8 +31,8 @@ FIXED_SIDE = -1  # in ContactProblem.at: an immovable side; n >= 0: node n; -2 -
 CONVERGED, LIMIT_REACHED, STALLED, SOLVE_FAILED, STORAGE_TOO_SMALL = range(
     5
 )  # SettingCounts.ended; STORAGE_TOO_SMALL: enlarge `FactorStorage`, call again
-MOST_SLABS = 32
-MOST_BLOCKS = 2 * MOST_SLABS  # slabs, cuts between them, the rest: see `packed_contacts`
+MOST_SLABS = 31
+MOST_BLOCKS = 2 * MOST_SLABS + 1  # slabs, cuts between them, the rest, contacts that are solved: see `packed_contacts`
 SLAB_BINS = 512
 BLOCK_KERNEL = 1  # place of the address of `gauss_seidel.block_kernel` in `FactorStorage.team`
 
@@ -60,7 +60,7 @@ class ContactProblem(NamedTuple):
     member: Int1  # (nn,): nodes by island
     member_p: Int1  # (ni + 1,): first node of each island in ``member``
     line_p: Int1  # (ni + 1,): first line of each island (an island may have lines and no contacts)
-    half_slab: Int1  # (nn,): of each node, see `packed_contacts`; (0,): contacts are not divided among threads
+    half_slab: Int1  # (nn,): of each node (-1 - h: solved), see `packed_contacts`; (0,): not divided
 
 
 class ContactSolution(NamedTuple):

@@ -8,7 +8,8 @@ Contacts of many nodes are divided into blocks, so that several threads can work
 with equally many nodes, each of two half slabs (`ContactProblem.half_slab`). A block holds the contacts within a slab,
 or those of a cut, between the last half of a slab and the first half of the next one. Slabs have no node in common, nor
 have cuts; all other contacts, of groups too, are in the last block, the rest. A sweep visits all slabs at the same
-time, then all cuts, then the rest. The blocks depend on places only, so that any number of threads gives the same bits.
+time, then all cuts, then the rest; contacts of islands that are solved are left out. The blocks depend on places only,
+so that any number of threads gives the same bits.
 
 A local update returns the largest change of a velocity that its new impulse causes [m/s]. With Coulomb's law the
 normal impulse is found first, then the tangential one within mu times that. In the convex form (``coulomb`` 0) the
@@ -112,7 +113,7 @@ def last_block(O):
 
 @formula
 def block_of_contact(P, c, slabs):
-    """Block of contact c: slab k, the cut slabs + k between slabs k and k + 1, or the rest."""
+    """Block of contact c: slab k, the cut slabs + k between slabs k and k + 1, the rest; one more if it is solved."""
     i, j = P.at[c, 0], P.at[c, 1]
     rest = 2 * max(slabs, 1) - 1
     if slabs < 2 or i < FIXED_SIDE or j < FIXED_SIDE or max(i, j) < 0:
@@ -120,6 +121,8 @@ def block_of_contact(P, c, slabs):
     a = P.half_slab[i if i >= 0 else j]
     b = P.half_slab[j if j >= 0 else i]
     low, high = min(a, b), max(a, b)
+    if low < 0:
+        return rest + 1
     if low // 2 == high // 2:
         return low // 2
     return slabs + low // 2 if high == low + 1 else rest
@@ -138,7 +141,7 @@ def find_blocks(P, W, O, part):
 @formula
 def order_by_block(W, O, first, last):
     """Sort contacts by block and kind into ``W.block_order``, stable; sets ``W.block_start``."""
-    blocks = last_block(O) + 1
+    blocks = last_block(O) + 2  # the last one of contacts that are solved
     for b in range(blocks):
         for kind in range(CONTACT_KINDS + 1):
             W.block_start[b, kind] = 0

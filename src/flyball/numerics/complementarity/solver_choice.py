@@ -439,6 +439,33 @@ def solve_islands(P, X, Y, W, O, F, f, count, some):
 
 
 @formula
+def mark_solved_nodes(P, I, F, some):
+    """Mark the nodes of the small islands as solved, for `packed_contacts.block_of_contact`; or end that."""
+    for i in range(some):
+        k = F.pick[i]
+        for e in range(I.member_p[k], I.member_p[k + 1]):
+            P.half_slab[I.member[e]] = -1 - P.half_slab[I.member[e]]
+
+
+@formula
+def solve_divided(P, X, Y, W, O, F, f, some):
+    """As `solve_islands` where contacts are divided into blocks, without groups: only small islands are copied."""
+    Q, I = F.P, F.islands
+    copy_islands(P, X, Q, Y, F, I, some, some)
+    sofar = (0.0, 0.0, 0, 0)
+    for k in range(some):
+        O.count.island = k
+        solve_small_island(Q, Y, W, O, F, f)
+        sofar = worst_outcome(O, sofar)
+    O.count.island = -1
+    mark_solved_nodes(P, I, F, some)
+    call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
+    mark_solved_nodes(P, I, F, some)
+    O.real.residual, O.real.force_residual, O.count.used, O.count.ended = worst_outcome(O, sofar)
+    copy_impulses_back(P, X, Y, F, I, some)
+
+
+@formula
 def solve_all_islands(P, X, W, O, F):
     """Solve all islands; see `auto`."""
     f, I = by_address(FactorStorage(F.numbers[:], F.places[:], F.team[:])), F.islands
@@ -454,17 +481,11 @@ def solve_all_islands(P, X, W, O, F):
     elif count == 1:
         solve_small_island(P, X, W, O, F, f)
     else:
-        solve_islands(
-            P,
-            X,
-            by_address(ContactSolution(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])),
-            W,
-            O,
-            F,
-            f,
-            count,
-            some,
-        )
+        Y = by_address(ContactSolution(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:]))
+        if O.count.slabs > 1 and ng == 0 and some < count:
+            solve_divided(P, X, Y, W, O, F, f, some)
+        else:
+            solve_islands(P, X, Y, W, O, F, f, count, some)
     return O.count.used
 
 
