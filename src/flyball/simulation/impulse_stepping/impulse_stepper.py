@@ -124,8 +124,11 @@ def make_workspaces(
 
 
 def slab_count(bodies: int) -> int:
-    """Number of slabs of so many bodies, with some `LAYERS` of them each if they fill a cube; 0 for few bodies."""
-    return min(MOST_SLABS, round(bodies ** (1.0 / 3.0) / LAYERS)) if bodies >= DIVIDED_BODIES else 0
+    """Number of slabs of so many bodies, with some `LAYERS` of them each if they fill a cube; 0 for few bodies.
+
+    It is even, so that two threads have equally many.
+    """
+    return 2 * min(MOST_SLABS // 2, round(bodies ** (1.0 / 3.0) / (2 * LAYERS))) if bodies >= DIVIDED_BODIES else 0
 
 
 def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> FreeBodies:
