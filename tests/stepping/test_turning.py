@@ -111,11 +111,7 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     rng, n = np.random.default_rng(4), 5
     P = empty_problem(n, 0, 0, 0, 0, True)
     X, Y = allocate_solver(P)[0], allocate_solver(P)[0]
-    state, before, now = (
-        initial_run_state(np.zeros(3)),
-        ContactMemory.blank(n),
-        ContactMemory.blank(n),
-    )
+    before, now = ContactMemory.blank(n), ContactMemory.blank(n)
     P.at[:] = -1
     P.mu[:] = 1.0
 
@@ -135,13 +131,13 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     X.p[:], X.torque[:] = 1.0 + rng.random((n, 3)), rng.normal(size=(n, 3))
     was = world()
     for c in range(n):
-        account_contact(P, X, c, (0.0, 0.0, 0.0), state, before)
-        account_rolling(P, X, Y, c, state, before)
+        account_contact(P, X, c, (0.0, 0.0, 0.0), before)
+        account_rolling(P, X, Y, c, before)
     C = no_contacts(n)
     C.count.found, C.at.before[:] = n, (3, 0, -1, 4, 1)
     normal = normal[C.at.before[:]]
     tangents()
-    warm_start(C, P, X, now, before)
+    warm_start(C, P, X, now, before, (0, n))
     old = C.at.before[:] >= 0
     assert world()[:, old] == pytest.approx(was[:, C.at.before[old]], abs=1e-14)
     assert not X.p[~old].any()

@@ -90,6 +90,44 @@ def call_bound(words, task):  # type: ignore[no-untyped-def]
     raise NotImplementedError("kernels are called by address from compiled code only")
 
 
+STORED_CALL_TABLES = 24
+STORED_CALL_WORDS = 2 + STORED_CALL_TABLES
+"""Size of a stored call: address of the code, number of structures, their addresses."""
+
+
+def store_call(words, address, tables):  # type: ignore[no-untyped-def]
+    """Store a call of the kernel at ``address`` with a tuple of structures in memory; in compiled code only."""
+    raise NotImplementedError("kernels are called by address from compiled code only")
+
+
+def run_stored_call(words, task):  # type: ignore[no-untyped-def]
+    """Make a stored call with a task; in compiled code only.
+
+    It passes `STORED_CALL_TABLES` arguments; in C's calling conventions a function ignores those that it does not take.
+    """
+    raise NotImplementedError("kernels are called by address from compiled code only")
+
+
+def atomic_load(address):  # type: ignore[no-untyped-def]
+    """Integer in memory; what another thread wrote before it stored that number is visible afterwards."""
+    raise NotImplementedError("memory is shared with threads in compiled code only")
+
+
+def atomic_store(address, value):  # type: ignore[no-untyped-def]
+    """Store an integer in memory, after all that was written before."""
+    raise NotImplementedError("memory is shared with threads in compiled code only")
+
+
+def atomic_add(address, value):  # type: ignore[no-untyped-def]
+    """Add to an integer in memory, indivisibly."""
+    raise NotImplementedError("memory is shared with threads in compiled code only")
+
+
+def atomic_replace(address, old, new):  # type: ignore[no-untyped-def]
+    """Replace an integer in memory if it is ``old``, indivisibly; whether it was."""
+    raise NotImplementedError("memory is shared with threads in compiled code only")
+
+
 def formula_at(table, k, arguments, like):  # type: ignore[no-untyped-def]
     """Call formula k of the code table at an address.
 

@@ -33,7 +33,24 @@ from numba.core.target_extension import (
 from numba.extending import intrinsic
 from numba.extending import overload as numba_overload
 
-from .formulas import ENTRY_NAME, FAILED, FIRST_ADDRESS, KERNELS, OPTIONS, call, call_bound, formula_at, has_formula
+from .formulas import (
+    ENTRY_NAME,
+    FAILED,
+    FIRST_ADDRESS,
+    KERNELS,
+    OPTIONS,
+    STORED_CALL_TABLES,
+    atomic_add,
+    atomic_load,
+    atomic_replace,
+    atomic_store,
+    call,
+    call_bound,
+    formula_at,
+    has_formula,
+    run_stored_call,
+    store_call,
+)
 from .numba_types import (
     INTEGER,
     load_numbers,
@@ -301,6 +318,106 @@ def _choose_call_bound(words, task):  # type: ignore[no-untyped-def]
     return lambda words, task: _call_words(
         words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task)
     )
+
+
+def _word(builder: Any, address: Any, k: int = 0) -> Any:
+    """Pointer to word k at an address."""
+    return builder.gep(builder.inttoptr(address, INTEGER.as_pointer()), [INTEGER(k)])
+
+
+@intrinsic
+def _store_call(typing, words, address, tables):  # type: ignore[no-untyped-def]
+    layouts = tuple(getattr(x, "layout", None) for x in tables)
+    if not any(k.parameters[:-1] == layouts for k in KERNELS) or len(layouts) >= STORED_CALL_TABLES:
+        raise TypingError(f"no kernel takes {tables}")
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        given = [builder.ptrtoint(builder.extract_value(args[2], k), INTEGER) for k in range(len(layouts))]
+        for k, x in enumerate((args[1], INTEGER(len(layouts)), *given)):
+            builder.store(x, _word(builder, args[0], k))
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, tables), generate
+
+
+@intrinsic
+def _run_stored_call(typing, words, task):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        code, count = (builder.load(_word(builder, args[0], k)) for k in range(2))
+        given = [
+            builder.select(
+                builder.icmp_signed("==", count, INTEGER(k)), args[1], builder.load(_word(builder, args[0], 2 + k))
+            )
+            for k in range(STORED_CALL_TABLES)
+        ]
+        of = ir.FunctionType(INTEGER, [INTEGER] * STORED_CALL_TABLES)
+        return builder.call(builder.inttoptr(code, of.as_pointer()), given)
+
+    return types.int64(types.int64, types.int64), generate
+
+
+@intrinsic
+def _atomic_load(typing, address):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.load_atomic(_word(builder, args[0]), "acquire", 8)
+
+    return types.int64(types.int64), generate
+
+
+@intrinsic
+def _atomic_store(typing, address, value):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        builder.store_atomic(args[1], _word(builder, args[0]), "release", 8)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64), generate
+
+
+@intrinsic
+def _atomic_add(typing, address, value):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.atomic_rmw("add", _word(builder, args[0]), args[1], "acq_rel")
+
+    return types.int64(types.int64, types.int64), generate
+
+
+@intrinsic
+def _atomic_replace(typing, address, old, new):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        found = builder.cmpxchg(_word(builder, args[0]), args[1], args[2], "acq_rel", "acquire")
+        return builder.extract_value(found, 1)
+
+    return types.boolean(types.int64, types.int64, types.int64), generate
+
+
+@overload(store_call)
+def _choose_store_call(words, address, tables):  # type: ignore[no-untyped-def]
+    return lambda words, address, tables: _store_call(words, address, tables)
+
+
+@overload(run_stored_call)
+def _choose_run_stored_call(words, task):  # type: ignore[no-untyped-def]
+    return lambda words, task: _run_stored_call(words, types.int64(task))
+
+
+@overload(atomic_load)
+def _choose_atomic_load(address):  # type: ignore[no-untyped-def]
+    return lambda address: _atomic_load(address)
+
+
+@overload(atomic_store)
+def _choose_atomic_store(address, value):  # type: ignore[no-untyped-def]
+    return lambda address, value: _atomic_store(address, types.int64(value))
+
+
+@overload(atomic_add)
+def _choose_atomic_add(address, value):  # type: ignore[no-untyped-def]
+    return lambda address, value: _atomic_add(address, types.int64(value))
+
+
+@overload(atomic_replace)
+def _choose_atomic_replace(address, old, new):  # type: ignore[no-untyped-def]
+    return lambda address, old, new: _atomic_replace(address, old, new)
 
 
 def _is_complex(typ: Any) -> bool:

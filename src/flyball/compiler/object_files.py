@@ -49,6 +49,8 @@ COSTS: dict[str, tuple[str, float]] = {
     "mechanism_kernel": ("mechanisms in time stepping", 7.9),
     "newton": ("the contact solver", 5.8),
     "gauss_seidel": ("the contact solver by sweeps", 3.5),
+    "block_kernel": ("the contact solver by sweeps", 3.0),
+    "contact_kernel": ("time stepping with contact", 2.5),
     "admm": ("the contact solver admm", 7.7),
     "apgd": ("the contact solver apgd", 6.4),
     "barzilai_borwein": ("the contact solver barzilai-borwein", 2.7),

@@ -30,6 +30,7 @@ from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, Start
 from ..model.messages import listing, suggest
 from ..model.model import Model
 from ..numerics.integrators.butcher_tableaux import TABLEAUX
+from ..numerics.thread_team import available_cores
 from ..progress import progress_bar
 from ..results.study import DONE, FAILED, NOT_RUN, Study, load_study_file, save_study, study_fingerprint
 from ..simulation.initial_state import start_time
@@ -234,14 +235,6 @@ LAST_TASK_DIVISOR = (
 MAX_TASK_STATES = 100_000  # largest number of states in memory per task
 QUEUED_TASKS_PER_WORKER = 4  # queued tasks per worker
 Task = Callable[[np.ndarray], "Future[RunResults]"]
-
-
-def available_cores() -> int:
-    """Number of cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
 
 
 def results_as_completed(

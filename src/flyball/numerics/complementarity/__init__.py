@@ -11,7 +11,7 @@ The small dense problem (`dense_problem`, `dense_solver`) decides which rows sti
 `solve_history` computes residuals over the iterations of any solver.
 `interior_point` and `douglas_rachford` find indeterminate forces within their cones.
 
-Imports: NumPy, `compiler/`, `math/`, `numerics/graphs`.
+Imports: NumPy, `compiler/`, `math/`, `numerics/graphs`, `numerics/thread_team`.
 
 Coulomb's law differs from the convex problem. Gauss-Seidel solves it directly; Newton alternates convex problems with
 De Saxce's terms and Newton steps on the law; ADMM updates these terms. Newton stores the impulses as multipliers

@@ -31,6 +31,10 @@ FIXED_SIDE = -1  # in ContactProblem.at: an immovable side; n >= 0: node n; -2 -
 CONVERGED, LIMIT_REACHED, STALLED, SOLVE_FAILED, STORAGE_TOO_SMALL = range(
     5
 )  # SettingCounts.ended; STORAGE_TOO_SMALL: enlarge `FactorStorage`, call again
+MOST_SLABS = 31
+MOST_BLOCKS = 2 * MOST_SLABS + 1  # slabs, cuts between them, the rest, contacts that are solved: see `packed_contacts`
+SLAB_BINS = 512
+BLOCK_KERNEL = 1  # place of the address of `gauss_seidel.block_kernel` in `FactorStorage.team`
 
 
 class ContactProblem(NamedTuple):
@@ -57,6 +61,7 @@ class ContactProblem(NamedTuple):
     member: Int1  # (nn,): nodes by island
     member_p: Int1  # (ni + 1,): first node of each island in ``member``
     line_p: Int1  # (ni + 1,): first line of each island (an island may have lines and no contacts)
+    half_slab: Int1  # (nn,): of each node (-1 - h: solved), see `packed_contacts`; (0,): not divided
 
 
 class ContactSolution(NamedTuple):
@@ -80,6 +85,7 @@ class SettingCounts(Record, kind="Int"):
     needed_numbers: int  # required sizes of `FactorStorage`
     needed_places: int
     directions: int  # edges of a friction pyramid
+    slabs: int  # number of slabs of nodes; 0: contacts are not divided among threads
     most_steps: int  # maximum steps of Newton's method if it is combined with sweeps by island; 0: equal to ``most``
 
 
@@ -173,21 +179,29 @@ class ContactWorkspace(NamedTuple):
     nodes: Float3  # (6, nn, 8)
     wide: Float2  # (6, nw): for the velocities of groups
     lines: Float2  # (9, nl): vectors of lines, as ``rows``
-    node_state: Float2  # (nn + 1, 8): of each node v, w, 1/m, mean of its block's diagonal; the last row is immovable
-    inner: Float2  # (nn + 1, 8): inverse inertia block of each node, two unused
-    free: Float2  # (nn + 1, 8): v, w without impulses, two unused
+    node_state: Float2  # (nn + MOST_BLOCKS, 8): of each node v, w, 1/m, mean of its block's diagonal; the last rows are
+    # immovable, one for each block of contacts
+    inner: Float2  # (nn + MOST_BLOCKS, 8): inverse inertia block of each node, two unused
+    free: Float2  # (nn + MOST_BLOCKS, 8): v, w without impulses, two unused
     free_wide: Float1  # velocities of the groups without impulses
     contact_nodes: Int2  # (nc, 3): in the order of sweeps the two nodes in ``node_state`` and the number of the contact
+    block_order: Int1  # (nc,): contacts by block and kind
+    block_start: (
+        Int2  # (MOST_BLOCKS, 6): place of the first contact of each block and kind, and of the one after the last
+    )
+    block_terms: Float2  # (MOST_BLOCKS, 8): largest change of a velocity in a sweep, terms of the residual; two unused
+    slab_bins: Int1  # (SLAB_BINS,): counts of nodes along an axis
     spheres: SphereContacts  # (nc): contacts in that order, each in the table of its kind
     frictionless: FrictionlessContacts  # (nc)
     frictional: FrictionalContacts  # (nc): also those of groups
 
 
 class FactorStorage(NamedTuple):
-    """Storage of solvers that factor matrices; empty for the others. Its contents last from call to call."""
+    """Storage of solvers that factor matrices; empty for the others. Its contents last from call to call. Threads."""
 
     numbers: Float1
     places: Int1
+    team: Int1 = np.zeros(0, np.int64)  # of threads (`thread_team.new_team`); not used where ``slabs`` is 0
 
 
 def empty_problem(
@@ -235,6 +249,7 @@ def empty_problem(
         member=np.arange(nn),
         member_p=ends(nn),
         line_p=ends(lines),
+        half_slab=np.zeros(0, whole),
     )
 
 
@@ -266,11 +281,15 @@ def allocate_solver(
         nodes=np.zeros((6, nn, 8)),
         wide=np.zeros((6, nw)),
         lines=np.zeros((9, nl)),
-        node_state=cache_aligned(nn + 1, 8),
-        inner=cache_aligned(nn + 1, 8),
-        free=cache_aligned(nn + 1, 8),
+        node_state=cache_aligned(nn + MOST_BLOCKS, 8),
+        inner=cache_aligned(nn + MOST_BLOCKS, 8),
+        free=cache_aligned(nn + MOST_BLOCKS, 8),
         free_wide=np.zeros(nw),
         contact_nodes=np.zeros((nc, 3), np.int64),
+        block_order=np.zeros(nc, np.int64),
+        block_start=np.zeros((MOST_BLOCKS, 6), np.int64),
+        block_terms=cache_aligned(MOST_BLOCKS, 8),
+        slab_bins=np.zeros(SLAB_BINS, np.int64),
         spheres=cache_aligned(nc, SphereContacts.layout.width).view(SphereContacts),
         frictionless=cache_aligned(nc, FrictionlessContacts.layout.width).view(FrictionlessContacts),
         frictional=cache_aligned(nc, FrictionalContacts.layout.width).view(FrictionalContacts),

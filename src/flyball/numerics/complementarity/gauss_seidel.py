@@ -6,6 +6,9 @@ here through `contact_operator`. Residuals are computed from the packed numbers,
 `contact_operator.residuals`: functions of one contact return the square of the missing impulse, its step, the
 square of the impulse, and its terms of b' p and of p' N p.
 
+Contacts are worked on block by block (`packed_contacts`), on several threads if there are many: all tasks of a solve
+but the ordering of contacts and the copies of node velocities.
+
 A solve that ends at the iteration limit returns its impulses scaled down if they would be worse than no impulse at
 all: p' N p / 2 + b' p is never positive, so that no energy is generated.
 """
@@ -15,6 +18,7 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...compiler.kernels import vectorised_kernel
 from ...math.scalar import sqrt
+from ..thread_team import call_chunks
 from .cone_projection import fraction_within, project_on_cone_above, rolling_cone_normal
 from .contact_operator import (
     ZERO_RESIDUAL,
@@ -28,6 +32,7 @@ from .contact_operator import (
     contact_terms,
     contact_velocity,
     finish_solve,
+    larger_or_nan,
     line_diagonal,
     line_range,
     line_velocity,
@@ -36,8 +41,10 @@ from .contact_operator import (
     rolling_diagonal_block,
 )
 from .contact_problem import (
+    BLOCK_KERNEL,
     CONVERGED,
     LIMIT_REACHED,
+    MOST_BLOCKS,
     ContactProblem,
     ContactSolution,
     ContactWorkspace,
@@ -48,15 +55,19 @@ from .packed_contacts import (
     CONTACT_KINDS,
     FRICTIONAL,
     FRICTIONLESS,
+    GENERAL,
     SMOOTH_SPHERE,
     SPHERE,
     copy_nodes,
-    count_contact_kinds,
+    find_blocks,
     frictional_velocity,
     frictionless_velocity,
+    interleaved_place,
+    last_block,
     local_impulse,
     local_step_sizes,
-    pack_contacts,
+    order_by_block,
+    pack_contact,
     sphere_sliding_velocity,
     update_frictional,
     update_frictionless,
@@ -258,54 +269,45 @@ def packed_terms(P, X, W, O, kind, s):
 
 
 @formula
-def packed_residuals(P, X, W, O, many):
-    """Compute what `residuals` returns from packed contacts; impulses must also be in X."""
-    sofar, begin = ZERO_RESIDUAL, 0
-    for kind in range(CONTACT_KINDS):
-        for s in range(begin, begin + many[kind]):
-            sofar = accumulate_residual(sofar, packed_terms(P, X, W, O, kind, s))
-        begin += many[kind]
-    return residual_summary(accumulate_line_residuals(P, X, O, X.wide, W.free_wide, sofar))
-
-
-@formula
 def visit_index(e, m, backwards):
     """Index of the e-th of m visits; counted from the end in a backward sweep."""
     return m - 1 - e if backwards else e
 
 
 @formula
-def sweep_spheres(W, O, many, backwards):
-    """Update all contacts of spheres."""
-    worst = 0.0
-    for e in range(many[SMOOTH_SPHERE]):
-        s = visit_index(e, many[SMOOTH_SPHERE], backwards)
+def sweep_spheres(W, O, block, backwards):
+    """Update all contacts of spheres of a block."""
+    worst, first = 0.0, W.block_start[block]
+    begin, many = first[SMOOTH_SPHERE], first[SMOOTH_SPHERE + 1] - first[SMOOTH_SPHERE]
+    for e in range(many):
+        s = begin + visit_index(e, many, backwards)
         i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
         worst = max(worst, update_smooth_sphere(W.spheres, W.node_state, i, j, s))
-    begin = many[SMOOTH_SPHERE]
-    for e in range(many[SPHERE]):
-        s = begin + visit_index(e, many[SPHERE], backwards)
+    begin, many = first[SPHERE], first[SPHERE + 1] - first[SPHERE]
+    for e in range(many):
+        s = begin + visit_index(e, many, backwards)
         i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
         worst = max(worst, update_sphere(W.spheres, W.node_state, i, j, s, O.count.coulomb))
     return worst
 
 
 @formula
-def sweep_other_contacts(P, X, W, O, many, backwards):
-    """Update all other contacts."""
-    worst, begin = 0.0, many[SMOOTH_SPHERE] + many[SPHERE]
-    for e in range(many[FRICTIONLESS]):
-        s = begin + visit_index(e, many[FRICTIONLESS], backwards)
+def sweep_other_contacts(P, X, W, O, block, backwards):
+    """Update all other contacts of a block."""
+    worst, first = 0.0, W.block_start[block]
+    begin, many = first[FRICTIONLESS], first[FRICTIONLESS + 1] - first[FRICTIONLESS]
+    for e in range(many):
+        s = begin + visit_index(e, many, backwards)
         i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
         worst = max(worst, update_frictionless(W.frictionless, W.node_state, i, j, s))
-    begin += many[FRICTIONLESS]
-    for e in range(many[FRICTIONAL]):
-        s = begin + visit_index(e, many[FRICTIONAL], backwards)
+    begin, many = first[FRICTIONAL], first[FRICTIONAL + 1] - first[FRICTIONAL]
+    for e in range(many):
+        s = begin + visit_index(e, many, backwards)
         i, j = W.contact_nodes[s, 0], W.contact_nodes[s, 1]
         worst = max(worst, update_frictional(W.frictional, W.node_state, W.inner, i, j, s, O.count.coulomb))
-    begin += many[FRICTIONAL]
-    for e in range(many[4]):
-        s = begin + visit_index(e, many[4], backwards)
+    begin, many = first[GENERAL], first[GENERAL + 1] - first[GENERAL]
+    for e in range(many):
+        s = begin + visit_index(e, many, backwards)
         worst = max(worst, update_general(P, X, W, O, W.contact_nodes[s, 2], s))
     return worst
 
@@ -321,54 +323,135 @@ def sweep_lines(P, X, O, backwards):
 
 
 @formula
-def sweep(P, X, W, O, many, backwards):
-    """Update all contacts and lines once; returns the largest change of a velocity."""
+def sweep_block(P, X, W, O, block, backwards):
+    """Update all contacts of a block, of the last block the lines too; returns the largest change of a velocity."""
+    last = block == last_block(O)
     if backwards:
-        a = sweep_lines(P, X, O, backwards)
-        b = sweep_other_contacts(P, X, W, O, many, backwards)
-        return max(max(a, b), sweep_spheres(W, O, many, backwards))
-    a = sweep_spheres(W, O, many, backwards)
-    b = sweep_other_contacts(P, X, W, O, many, backwards)
-    return max(max(a, b), sweep_lines(P, X, O, backwards))
+        a = sweep_lines(P, X, O, backwards) if last else 0.0
+        b = sweep_other_contacts(P, X, W, O, block, backwards)
+        return max(max(a, b), sweep_spheres(W, O, block, backwards))
+    a = sweep_spheres(W, O, block, backwards)
+    b = sweep_other_contacts(P, X, W, O, block, backwards)
+    return max(max(a, b), sweep_lines(P, X, O, backwards) if last else 0.0)
 
 
 @formula
-def unpack_impulses(P, X, W, many):
-    """Copy packed impulses back to X."""
-    for at in range(many[0] + many[1] + many[2] + many[3] + many[4]):
-        c = W.contact_nodes[at, 2]
-        if at < many[0] + many[1]:
-            a, b, d = (
-                W.spheres.tangent[at, 0],
-                W.spheres.tangent[at, 1],
-                W.spheres.tangent[at, 2],
+def pack_block(P, X, W, O, block):
+    """Pack the contacts of a block, and apply their initial impulses."""
+    for kind in range(CONTACT_KINDS):
+        begin, many = W.block_start[block, kind], W.block_start[block, kind + 1] - W.block_start[block, kind]
+        for e in range(many):
+            c = W.block_order[begin + e]
+            pack_contact(P, X, W, O.count.coulomb, c, kind, begin + interleaved_place(e, many), P.size[1] + block)
+
+
+@formula
+def finish_block(P, X, W, O, block):
+    """Copy the packed impulses of a block back to X, and store its terms of the residual."""
+    sofar = ZERO_RESIDUAL
+    for kind in range(CONTACT_KINDS):
+        for at in range(W.block_start[block, kind], W.block_start[block, kind + 1]):
+            unpack_impulse(P, X, W, kind, at)
+            sofar = accumulate_residual(sofar, packed_terms(P, X, W, O, kind, at))
+    for k in range(5):
+        W.block_terms[block, 1 + k] = sofar[k]
+
+
+@formula
+def unpack_impulse(P, X, W, kind, at):
+    """Copy a packed impulse back to X."""
+    c = W.contact_nodes[at, 2]
+    if kind == SMOOTH_SPHERE:
+        X.p[c, 0], X.p[c, 1], X.p[c, 2] = W.spheres.impulse[at], 0.0, 0.0
+    elif kind == SPHERE:
+        a, b, d = W.spheres.tangent[at, 0], W.spheres.tangent[at, 1], W.spheres.tangent[at, 2]
+        X.p[c, 0] = W.spheres.impulse[at]
+        X.p[c, 1] = P.frame[c, 3] * a + P.frame[c, 4] * b + P.frame[c, 5] * d
+        X.p[c, 2] = P.frame[c, 6] * a + P.frame[c, 7] * b + P.frame[c, 8] * d
+    elif kind == FRICTIONLESS:
+        X.p[c, 0], X.p[c, 1], X.p[c, 2] = W.frictionless.impulse[at], 0.0, 0.0
+    else:
+        for k in range(3):
+            X.p[c, k] = W.frictional.impulse[at, k]
+
+
+FIND, PACK, FORWARDS, BACKWARDS, FINISH = range(5)  # tasks
+
+
+@formula
+def work_on_block(P, X, W, O, work, block):
+    """Do a task for a block."""
+    if work == FIND:
+        find_blocks(P, W, O, block)
+    elif work == PACK:
+        pack_block(P, X, W, O, block)
+    elif work == FINISH:
+        finish_block(P, X, W, O, block)
+    else:
+        W.block_terms[block, 0] = sweep_block(P, X, W, O, block, work == BACKWARDS)
+
+
+@vectorised_kernel
+def block_kernel(
+    P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+) -> int:
+    """Do task // MOST_BLOCKS for block task % MOST_BLOCKS."""
+    work_on_block(P, X, W, O, task // MOST_BLOCKS, task % MOST_BLOCKS)
+    return 0
+
+
+@formula
+def work_on_blocks(P, X, W, O, F, work):
+    """Do a task for all blocks: for slabs at the same time, for cuts at the same time, for the rest; or backwards."""
+    slabs = O.count.slabs
+    for k in range(3):
+        stage = 2 - k if work == BACKWARDS else k
+        if stage == 2:
+            work_on_block(P, X, W, O, work, last_block(O))
+        elif slabs > 1:
+            call_chunks(
+                F.team, F.team[BLOCK_KERNEL], (P, X, W, O, F), work * MOST_BLOCKS + stage * slabs, slabs - stage
             )
-            X.p[c, 0] = W.spheres.impulse[at]
-            if at < many[0]:
-                X.p[c, 1], X.p[c, 2] = 0.0, 0.0
-            else:
-                X.p[c, 1] = P.frame[c, 3] * a + P.frame[c, 4] * b + P.frame[c, 5] * d
-                X.p[c, 2] = P.frame[c, 6] * a + P.frame[c, 7] * b + P.frame[c, 8] * d
-        elif at < many[0] + many[1] + many[2]:
-            X.p[c, 0], X.p[c, 1], X.p[c, 2] = W.frictionless.impulse[at], 0.0, 0.0
-        else:
-            for k in range(3):
-                X.p[c, k] = W.frictional.impulse[at, k]
 
 
 @formula
-def prepare_sweeps(P, X, W, O):
-    """Pack all contacts, and apply the initial impulses; returns the number of contacts of each kind."""
+def largest_change(W, O):
+    """Largest change of a velocity in a sweep, of all blocks; nan if any is."""
+    last = last_block(O)
+    worst = W.block_terms[last, 0]
+    for block in range(last if O.count.slabs > 1 else 0):
+        worst = larger_or_nan(worst, W.block_terms[block, 0])
+    return worst
+
+
+@formula
+def residual_of_blocks(P, X, W, O):
+    """Compute what `residuals` returns from the terms of the blocks."""
+    last = last_block(O)
+    sofar = ZERO_RESIDUAL
+    for block in range(0 if O.count.slabs > 1 else last, last + 1):
+        t = W.block_terms[block]
+        a, b, c = larger_or_nan(sofar[0], t[1]), larger_or_nan(sofar[1], t[2]), larger_or_nan(sofar[2], t[3])
+        sofar = (a, b, c, sofar[3] + t[4], sofar[4] + t[5])
+    return residual_summary(accumulate_line_residuals(P, X, O, X.wide, W.free_wide, sofar))
+
+
+@formula
+def prepare_sweeps(P, X, W, O, F):
+    """Pack all contacts, and apply the initial impulses."""
     first, last = contact_range(P, O)
     copy_nodes(P, X, W, node_range(P, O))
+    for i in range(P.size[1] + 1, P.size[1] + last_block(O) + 1):
+        for k in range(8):
+            W.node_state[i, k] = 0.0
     for k in range(X.wide.shape[0]):
         W.free_wide[k] = X.wide[k]
-    many = count_contact_kinds(P, W, first, last, 0)
-    pack_contacts(P, X, W, O.count.coulomb, first, many)
+    work_on_blocks(P, X, W, O, F, FIND)
+    order_by_block(W, O, first, last)
+    work_on_blocks(P, X, W, O, F, PACK)
     begin, end = line_range(P, O)
     for k in range(begin, end):
         apply_line_impulse(P, X.wide, k, X.line[k])
-    return many
 
 
 @vectorised_kernel
@@ -376,15 +459,15 @@ def gauss_seidel(
     P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
     """Sweep until velocities change by less than O.real.enough, at most O.count.most times; returns the sweeps."""
-    many = prepare_sweeps(P, X, W, O)
+    prepare_sweeps(P, X, W, O, F)
     used, O.count.ended = 0, LIMIT_REACHED
     while used < O.count.most:
-        worst = sweep(P, X, W, O, many, used % 2 == 1)
+        work_on_blocks(P, X, W, O, F, FORWARDS if used % 2 == 0 else BACKWARDS)
         used += 1
-        if worst <= O.real.enough:
+        if largest_change(W, O) <= O.real.enough:
             O.count.ended = CONVERGED
             break
     O.count.used = used
-    unpack_impulses(P, X, W, many)
-    finish_solve(P, X, W, O, packed_residuals(P, X, W, O, many))
+    work_on_blocks(P, X, W, O, F, FINISH)
+    finish_solve(P, X, W, O, residual_of_blocks(P, X, W, O))
     return used

@@ -4,6 +4,13 @@ Contacts are grouped by kind, the kinds with the least work first: spheres witho
 friction, others with friction, and general ones (groups, rolling friction). Within a kind, successive contacts are
 taken from distant places of the list, so that they share no body and the processor works on several at once.
 
+Contacts of many nodes are divided into blocks, so that several threads can work on them. Space is divided into slabs
+with equally many nodes, each of two half slabs (`ContactProblem.half_slab`). A block holds the contacts within a slab,
+or those of a cut, between the last half of a slab and the first half of the next one. Slabs have no node in common, nor
+have cuts; all other contacts, of groups too, are in the last block, the rest. A sweep visits all slabs at the same
+time, then all cuts, then the rest; contacts of islands that are solved are left out. The blocks depend on places only,
+so that any number of threads gives the same bits.
+
 A local update returns the largest change of a velocity that its new impulse causes [m/s]. With Coulomb's law the
 normal impulse is found first, then the tangential one within mu times that. In the convex form (``coulomb`` 0) the
 impulse after a step is projected on the cone, in the metric of the diagonal block.
@@ -15,7 +22,14 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import cross, dot
 from .cone_projection import fraction_within, least_normal_impulse
-from .contact_operator import angular_response, apply_contact_impulse, apply_torque_impulse, diagonal_block, frame_axis
+from .contact_operator import (
+    angular_response,
+    apply_contact_impulse,
+    apply_torque_impulse,
+    contact_range,
+    diagonal_block,
+    frame_axis,
+)
 from .contact_problem import FIXED_SIDE
 
 SMOOTH_SPHERE, SPHERE, FRICTIONLESS, FRICTIONAL, GENERAL, CONTACT_KINDS = range(6)
@@ -89,6 +103,69 @@ def interleaved_place(e, m):
     if e < q * INTERLEAVED_STREAMS:
         return (e % q) * INTERLEAVED_STREAMS + e // q
     return e
+
+
+@formula
+def last_block(O):
+    """Number of the last block, the rest."""
+    return 2 * max(O.count.slabs, 1) - 1
+
+
+@formula
+def block_of_contact(P, c, slabs):
+    """Block of contact c: slab k, the cut slabs + k between slabs k and k + 1, the rest; one more if it is solved."""
+    i, j = P.at[c, 0], P.at[c, 1]
+    rest = 2 * max(slabs, 1) - 1
+    if slabs < 2 or i < FIXED_SIDE or j < FIXED_SIDE or max(i, j) < 0:
+        return rest
+    a = P.half_slab[i if i >= 0 else j]
+    b = P.half_slab[j if j >= 0 else i]
+    low, high = min(a, b), max(a, b)
+    if low < 0:
+        return rest + 1
+    if low // 2 == high // 2:
+        return low // 2
+    return slabs + low // 2 if high == low + 1 else rest
+
+
+@formula
+def find_blocks(P, W, O, part):
+    """Write block and kind of each contact of a part of the list, one part for each block, to W.rows[0, c, 0]."""
+    first, last = contact_range(P, O)
+    parts, slabs = last_block(O) + 1, O.count.slabs
+    begin, end = first + (last - first) * part // parts, first + (last - first) * (part + 1) // parts
+    for c in range(begin if slabs > 1 else first, end):
+        W.rows[0, c, 0] = block_of_contact(P, c, slabs) * CONTACT_KINDS + contact_kind(P, W, c, 0)
+
+
+@formula
+def order_by_block(W, O, first, last):
+    """Sort contacts by block and kind into ``W.block_order``, stable; sets ``W.block_start``."""
+    blocks = last_block(O) + 2  # the last one of contacts that are solved
+    for b in range(blocks):
+        for kind in range(CONTACT_KINDS + 1):
+            W.block_start[b, kind] = 0
+    for c in range(first, last):
+        code = int(W.rows[0, c, 0])
+        W.block_start[code // CONTACT_KINDS, code % CONTACT_KINDS] += 1
+    place = 0
+    for b in range(blocks):
+        for kind in range(CONTACT_KINDS):
+            many = W.block_start[b, kind]
+            W.block_start[b, kind] = place
+            place += many
+    for c in range(first, last):
+        code = int(W.rows[0, c, 0])
+        b, kind = code // CONTACT_KINDS, code % CONTACT_KINDS
+        W.block_order[W.block_start[b, kind]] = c
+        W.block_start[b, kind] += 1
+    place = 0
+    for b in range(blocks):
+        for kind in range(CONTACT_KINDS):
+            end = W.block_start[b, kind]
+            W.block_start[b, kind] = place
+            place = end
+        W.block_start[b, CONTACT_KINDS] = place
 
 
 @formula
@@ -212,7 +289,7 @@ def pack_contacts(P, X, W, coulomb, first, many):
             if W.rows[0, c, 0] == kind:
                 visit = interleaved_place(e, m)
                 e += 1
-                pack_contact(P, X, W, coulomb, c, kind, begin + visit)
+                pack_contact(P, X, W, coulomb, c, kind, begin + visit, P.size[1])
         begin += m
 
 
@@ -233,10 +310,10 @@ def make_admissible(P, X, c):
 
 
 @formula
-def pack_contact(P, X, W, coulomb, c, kind, place):
-    """Pack one contact, and apply its impulse."""
+def pack_contact(P, X, W, coulomb, c, kind, place, still):
+    """Pack one contact, and apply its impulse; still: row of ``W.node_state`` for an immovable side."""
     i, j = P.at[c, 0], P.at[c, 1]
-    i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
+    i, j = i if i >= 0 else still, j if j >= 0 else still
     W.contact_nodes[place, 0], W.contact_nodes[place, 1], W.contact_nodes[place, 2] = i, j, c
     make_admissible(P, X, c)
     if kind == SMOOTH_SPHERE or kind == SPHERE:

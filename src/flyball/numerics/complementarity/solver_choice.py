@@ -16,10 +16,12 @@ from ...compiler.formulas import by_address, call, formula
 from ...compiler.kernels import Kernel, kernel
 from ...compiler.struct_layout import Float1, Int1, Int2
 from ..graphs import find_root, unite
+from ..thread_team import new_team
 from .admm import admm
 from .apgd import apgd, scaled_apgd
 from .barzilai_borwein import barzilai_borwein
 from .contact_problem import (
+    BLOCK_KERNEL,
     CONVERGED,
     FIXED_SIDE,
     LIMIT_REACHED,
@@ -35,7 +37,7 @@ from .contact_problem import (
     empty_problem,
 )
 from .friction_pyramid import lcp, lcp_storage, pyramid
-from .gauss_seidel import gauss_seidel
+from .gauss_seidel import block_kernel, gauss_seidel
 from .jacobi import jacobi
 from .newton import newton
 
@@ -256,6 +258,7 @@ class IslandSolver(NamedTuple):
 
     numbers: Float1
     places: Int1
+    team: Int1
     P: ContactProblem
     X: ContactSolution
     islands: Islands
@@ -436,9 +439,36 @@ def solve_islands(P, X, Y, W, O, F, f, count, some):
 
 
 @formula
+def mark_solved_nodes(P, I, F, some):
+    """Mark the nodes of the small islands as solved, for `packed_contacts.block_of_contact`; or end that."""
+    for i in range(some):
+        k = F.pick[i]
+        for e in range(I.member_p[k], I.member_p[k + 1]):
+            P.half_slab[I.member[e]] = -1 - P.half_slab[I.member[e]]
+
+
+@formula
+def solve_divided(P, X, Y, W, O, F, f, some):
+    """As `solve_islands` where contacts are divided into blocks, without groups: only small islands are copied."""
+    Q, I = F.P, F.islands
+    copy_islands(P, X, Q, Y, F, I, some, some)
+    sofar = (0.0, 0.0, 0, 0)
+    for k in range(some):
+        O.count.island = k
+        solve_small_island(Q, Y, W, O, F, f)
+        sofar = worst_outcome(O, sofar)
+    O.count.island = -1
+    mark_solved_nodes(P, I, F, some)
+    call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
+    mark_solved_nodes(P, I, F, some)
+    O.real.residual, O.real.force_residual, O.count.used, O.count.ended = worst_outcome(O, sofar)
+    copy_impulses_back(P, X, Y, F, I, some)
+
+
+@formula
 def solve_all_islands(P, X, W, O, F):
     """Solve all islands; see `auto`."""
-    f, I = by_address(FactorStorage(F.numbers[:], F.places[:])), F.islands
+    f, I = by_address(FactorStorage(F.numbers[:], F.places[:], F.team[:])), F.islands
     O.count.used, O.count.ended, O.count.island = 0, CONVERGED, -1
     O.real.residual, O.real.force_residual = 0.0, 0.0
     nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
@@ -451,17 +481,11 @@ def solve_all_islands(P, X, W, O, F):
     elif count == 1:
         solve_small_island(P, X, W, O, F, f)
     else:
-        solve_islands(
-            P,
-            X,
-            by_address(ContactSolution(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])),
-            W,
-            O,
-            F,
-            f,
-            count,
-            some,
-        )
+        Y = by_address(ContactSolution(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:]))
+        if O.count.slabs > 1 and ng == 0 and some < count:
+            solve_divided(P, X, Y, W, O, F, f, some)
+        else:
+            solve_islands(P, X, Y, W, O, F, f, count, some)
     return O.count.used
 
 
@@ -515,7 +539,12 @@ def solver_names() -> tuple[str, ...]:
 
 
 def prepare_solver(
-    name: str, P: ContactProblem, X: ContactSolution, W: ContactWorkspace, O: SolverSettings
+    name: str,
+    P: ContactProblem,
+    X: ContactSolution,
+    W: ContactWorkspace,
+    O: SolverSettings,
+    team: np.ndarray | None = None,
 ) -> PreparedSolver:
     """Prepare a solver for problems of these capacities; compiles what it needs.
 
@@ -525,6 +554,8 @@ def prepare_solver(
         One of `solver_names`.
     P, X, W, O : ContactProblem, ContactState, ContactWorkspace, SolverSettings
         With their final capacities.
+    team : ndarray, optional
+        Of threads (`thread_team.new_team`).
 
     Returns
     -------
@@ -536,14 +567,17 @@ def prepare_solver(
     KeyError
         If the name is unknown.
     """
+    team = new_team() if team is None else team
+    if O.count.slabs > 1:
+        team[BLOCK_KERNEL] = block_kernel.address
     if name != "auto" and name not in FACTORISING_SOLVERS:
-        made = allocate_island_solver(P, False)
+        made = allocate_island_solver(P, False, team)
         made.doors[OTHER_SOLVER] = SOLVERS[name].address
         return PreparedSolver(auto, made, np.zeros(0, np.int64))
     whole = name != "auto"
-    made = allocate_island_solver(P, whole)
+    made = allocate_island_solver(P, whole, team)
     if name == PIVOTING_SOLVER:
-        made = made._replace(**lcp_storage()._asdict())
+        made = made._replace(**lcp_storage()._replace(team=team)._asdict())
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLAND_SOLVER] = first.address
     if name == "auto" and newton_suffices(len(P.node), len(P.group) - 1, len(P.turn) > 0):
@@ -564,7 +598,7 @@ def unlimited_islands(P: ContactProblem) -> tuple[int, ...]:
     return nc, nn, nc, nn, nc
 
 
-def allocate_island_solver(P: ContactProblem, whole: bool) -> IslandSolver:
+def allocate_island_solver(P: ContactProblem, whole: bool, team: np.ndarray) -> IslandSolver:
     """Allocate the storage of `auto`; ``whole``: for islands of any size."""
     nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
     limit = np.zeros(LIMITS, np.int64)
@@ -574,7 +608,7 @@ def allocate_island_solver(P: ContactProblem, whole: bool) -> IslandSolver:
     islands = allocate_islands(nc, nn, ng, nl)
     most = len(islands.island) + 1
     Q = empty_problem(nc, nn, ng, nl, 0, len(P.turn) > 0)._replace(
-        node=P.node, group=P.group, J=P.J, Y=P.Y, columns=P.columns, least=np.zeros(len(P.least)),
+        node=P.node, half_slab=P.half_slab, group=P.group, J=P.J, Y=P.Y, columns=P.columns, least=np.zeros(len(P.least)),
         **{k: np.zeros(most, np.int64) for k in ("island", "member_p", "line_p")},
     )  # fmt: skip
     size = contacts + nodes + nl + wide
@@ -582,6 +616,6 @@ def allocate_island_solver(P: ContactProblem, whole: bool) -> IslandSolver:
     return IslandSolver(
         np.zeros(NUMBERS_PER_ITEM * size + 72 * fill),
         np.zeros(PLACES_PER_ITEM * size + 4 * fill + nn + 3 * ng, np.int64),
-        Q, allocate_solver(Q)[0], islands, np.zeros(most, np.int64),
+        team, Q, allocate_solver(Q)[0], islands, np.zeros(most, np.int64),
         np.zeros(SOLVER_SLOTS, np.int64), limit, np.zeros(STATISTICS, np.int64),
     )  # fmt: skip

@@ -39,7 +39,7 @@ from ...numerics.complementarity.contact_operator import (
     to_world_frame,
 )
 from ...tables.table_definitions import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
-from .contact_laws import contact_stiffness
+from .contact_laws import contact_stiffness, remaining_gap
 from .free_bodies import rest_speed, speed_of_fall
 from .stepping_tables import (
     MIDDLE_FOUND,
@@ -49,13 +49,11 @@ from .stepping_tables import (
 
 
 @formula
-def fill_rows(G, M, C, P, L, state):
-    """Fill the contact problem except impulses and masses; its sizes too."""
+def fill_rows(G, M, C, P, L, state, contacts):
+    """Fill the contact problem except impulses, masses and sizes; contacts: the first, and the one after the last."""
     h = state.times.step
-    P.size[0] = C.count.found
-    P.island[0], P.island[1] = 0, C.count.found
     turns = P.turn.shape[0] > 0
-    for c in range(C.count.found):
+    for c in range(contacts[0], contacts[1]):
         i, j = C.at.shape_1[c], C.at.shape_2[c]
         a, b = P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
         point = load3(C.x.point, c, 0)
@@ -139,9 +137,9 @@ def add_surface_velocity(M, L, P, c, shape, mover, sign):
 
 
 @formula
-def warm_start(C, P, X, now, before):
+def warm_start(C, P, X, now, before, contacts):
     """Start from the impulses of the same contacts in the step before; note which contacts stuck."""
-    for c in range(C.count.found):
+    for c in range(contacts[0], contacts[1]):
         o = C.at.before[c]
         now.sliding[c] = before.sliding[o] if o >= 0 else -1.0
         store3(X.p, c, 0, previous_impulse(P, c, before.impulse, o))
@@ -169,10 +167,10 @@ def projection_coefficient(x, row):
 
 
 @formula
-def static_friction_of_sticking(G, C, P, L, X, state, now):
+def static_friction_of_sticking(G, C, P, L, X, state, now, contacts):
     """Set the static coefficient for contacts that stuck before, and for new ones that hardly slide."""
     slow = speed_of_fall(state, state.times.step)
-    for c in range(C.count.found):
+    for c in range(contacts[0], contacts[1]):
         law = L.pair[G.shape.material[C.at.shape_1[c]], G.shape.material[C.at.shape_2[c]]]
         if law[STATIC] > law[KINETIC] and now.sliding[c] < 0.5:
             u = contact_velocity(P, X.v, X.wide, c)
@@ -289,24 +287,23 @@ def had_impact(now, c):
 
 
 @formula
-def was_in_impact(G, C, now, c, impacts):
+def was_in_impact(G, C, now, c, first):
     """Return whether contact c, or a mechanism that it is on, had an impact before the step.
 
-    impacts: first mover of the mechanism, and whether there were any.
+    first: first mover of a mechanism with impacts.
     """
-    first, any_ = impacts
     a, b = movers_of_contact(G, C, c)
-    return had_impact(now, c) or (any_ and max(a, b) >= first)
+    return had_impact(now, c) or max(a, b) >= first
 
 
 @formula
-def find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, impacts):
+def find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, contacts):
     """Find persistent contacts, and the relative velocities at the start. Returns whether rows in the middle are
     needed.
     """
     h, wanted = state.times.step, False
-    slow = rest_speed(state, h)
-    for c in range(C.count.found):
+    slow, struck = rest_speed(state, h), state.counts.first_struck
+    for c in range(contacts[0], contacts[1]):
         o, u = C.at.before[c], start_velocity(G, C, N, P, X, c)
         store3(now.middle_bias, c, 0, (0.0, 0.0, 0.0))
         store3(now.start_velocity, c, 0, u)
@@ -317,9 +314,7 @@ def find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, impacts
         closing = -dot(load3(C.x.normal, c, 0), u)
         if soft or closing <= state.tolerances.velocity:
             now.persistence[c] = PRESSES
-        steady = (
-            closing <= slow and not was_in_impact(G, C, now, c, impacts) and speed_is_clear(G, C, N, P, X, c, state)
-        )
+        steady = closing <= slow and not was_in_impact(G, C, now, c, struck) and speed_is_clear(G, C, N, P, X, c, state)
         if not soft and steady and rows_change(G, M, C, D, P, c, h):
             now.persistence[c] = MIDDLE_WANTED
             wanted = True
@@ -399,18 +394,12 @@ def bias_persistent_contacts(G, M, C, P, X, now, before):
 CONE_TOLERANCE = 1e-9  # relative distance from the friction cone within which an impulse is on it
 
 
-@formula
-def add_loss(state, numerical, lost):
-    """Account for lost energy: as a numerical error, or as lost in impacts."""
-    if numerical:
-        state.sums.numerical_loss += lost
-    else:
-        state.sums.impact_loss += lost
+NO_LOSS = (0.0, 0.0, 0.0, 0.0)  # lost by friction, in impacts, work of surfaces, lost numerically [J]
 
 
 @formula
-def account_contact(P, X, c, u, state, now):
-    """Store the impulse of contact c for the next step, and account for its work at the mean velocities u of the step.
+def account_contact(P, X, c, u, now):
+    """Store the impulse of contact c for the next step; return its energies (`NO_LOSS`) at the mean velocities u.
 
     For a persistent contact, work along the normal is a numerical error, and so is work along its tangents if it sticks
     before and after. Friction never supplies energy: a negative mean loss is added to the other account, whose sum with
@@ -418,32 +407,53 @@ def account_contact(P, X, c, u, state, now):
     """
     n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     store3(now.impulse, c, 0, to_world_frame(P, c, n, s, t))
-    if n > 0.0:
-        belt = (P.bias[c, 1] - now.middle_bias[c, 1]) * s + (P.bias[c, 2] - now.middle_bias[c, 2]) * t
-        numerical = now.persistence[c] > 0.0 or now.stiffness[c] > 0.0
-        slides = sqrt(s * s + t * t) >= (1.0 - CONE_TOLERANCE) * P.mu[c] * n
-        worn = -(s * u[1] + t * u[2] + belt)
-        sticks = now.persistence[c] > 0.0 and now.sliding[c] == 0.0 and not slides
-        add_loss(state, numerical, -(n * u[0]))
-        if sticks or worn < 0.0:
-            add_loss(state, numerical, worn)
-        else:
-            state.sums.friction_loss += worn
-        state.sums.surface_work -= belt
-        now.sliding[c] = 1.0 if slides else 0.0
-    else:
+    if not n > 0.0:
         now.sliding[c] = -1.0
+        return NO_LOSS
+    belt = (P.bias[c, 1] - now.middle_bias[c, 1]) * s + (P.bias[c, 2] - now.middle_bias[c, 2]) * t
+    numerical = now.persistence[c] > 0.0 or now.stiffness[c] > 0.0
+    slides = sqrt(s * s + t * t) >= (1.0 - CONE_TOLERANCE) * P.mu[c] * n
+    worn = -(s * u[1] + t * u[2] + belt)
+    sticks = now.persistence[c] > 0.0 and now.sliding[c] == 0.0 and not slides
+    lost = -(n * u[0]) + (worn if sticks or worn < 0.0 else 0.0)
+    now.sliding[c] = 1.0 if slides else 0.0
+    return 0.0 if sticks or worn < 0.0 else worn, 0.0 if numerical else lost, -belt, lost if numerical else 0.0
 
 
 @formula
-def account_rolling(P, X, Y, c, state, now):
-    """Store the impulse of rolling and spinning friction at contact c, and account for its work at mean velocities
-    ``Y``.
-    """
+def account_rolling(P, X, Y, c, now):
+    """Store the impulse of rolling and spinning friction at contact c; return its energies at mean velocities ``Y``."""
     t = load3(X.torque, c, 0)
     store3(now.torque, c, 0, to_world_frame(P, c, t[0], t[1], t[2]))
     worn = -dot(t, contact_angular_velocity(P, Y.v, Y.wide, c))
-    if worn >= 0.0:
-        state.sums.friction_loss += worn
-    else:
-        state.sums.numerical_loss += worn
+    return max(worn, 0.0), 0.0, 0.0, min(worn, 0.0)
+
+
+@formula
+def account_contacts(C, P, Q, R, X, Y, state, now, part, contacts):
+    """Set the gaps of the position solve, and account for the works of contacts; results in row ``part`` of
+    ``state.parts``.
+    """
+    h, sums, deepest, overlap = state.times.step, NO_LOSS, 0.0, 0.0
+    for c in range(contacts[0], contacts[1]):
+        u = contact_velocity(P, Y.v, Y.wide, c)
+        gap = C.x.gap[c] + h * u[0]
+        if now.stiffness[c] > 0.0:
+            gap = remaining_gap(now, c, gap)
+        else:
+            overlap = min(overlap, C.x.gap[c])
+        deepest = min(deepest, -abs(gap) if now.persistence[c] == MIDDLE_FOUND else gap)
+        Q.bias[c, 0] = R.bias[c, 0] = gap / h
+        sums = add4(sums, account_contact(P, X, c, u, now))
+        if P.turn.shape[0] > 0:
+            sums = add4(sums, account_rolling(P, X, Y, c, now))
+        store3(Y.p, c, 0, (0.0, 0.0, 0.0))
+    parts = state.parts
+    parts.friction_loss[part], parts.impact_loss[part], parts.surface_work[part], parts.numerical_loss[part] = sums
+    parts.deepest[part], parts.overlap[part] = deepest, overlap
+
+
+@formula
+def add4(a, b):
+    """Sum of two tuples of four numbers."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]

@@ -150,6 +150,51 @@ def mean_velocities(N, X, Y):
             Y.v[k, i] = X.v[k, i] + N.move[k, i]
 
 
+BIN_RANGE = (
+    2.5  # of the bins on both sides of the mean place, in standard deviations; farther bodies are in the last ones
+)
+
+
+@formula
+def widest_axis(M, n):
+    """Return the axis along which the places of n bodies vary most, their mean and standard deviation."""
+    axis, middle, most = 0, 0.0, -1.0
+    for k in range(3):
+        mean, square = 0.0, 0.0
+        for i in range(n):
+            mean += M.pose[i, k]
+        mean /= n
+        for i in range(n):
+            x = M.pose[i, k] - mean
+            square += x * x
+        if square > most:
+            axis, middle, most = k, mean, square
+    return axis, middle, sqrt(most / n)
+
+
+@formula
+def divide_space(M, half_slab, bins, halves):
+    """Number the half slab of each body: layers of equally many bodies along the axis on which places vary most."""
+    n, many = half_slab.shape[0], bins.shape[0]
+    if n == 0:
+        return
+    axis, middle, width = widest_axis(M, n)
+    per_width = many / (2.0 * BIN_RANGE * width) if width > 0.0 else 0.0
+    for b in range(many):
+        bins[b] = 0
+    for i in range(n):
+        b = int(min(many - 1.0, max(0.0, 0.5 * many + (M.pose[i, axis] - middle) * per_width)))
+        half_slab[i] = b
+        bins[b] += 1
+    before = 0
+    for b in range(many):
+        count = bins[b]
+        bins[b] = min(halves - 1, before * halves // n)
+        before += count
+    for i in range(n):
+        half_slab[i] = bins[half_slab[i]]
+
+
 @formula
 def clear_velocities(Y):
     """Set all velocities to zero."""

@@ -1,7 +1,8 @@
-"""The stepper: calls the compiled step loop, and creates and enlarges its tables."""
+"""The stepper: calls the compiled step loop, creates and enlarges its tables, records the residuals of solves."""
 
 from __future__ import annotations
 
+import ctypes
 import time
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from ...compiler.kernels import StructBuffer, check_layout
 from ...engine.entry_point import engine
 from ...errors import ModelError
 from ...numerics.complementarity.contact_problem import (
+    MOST_SLABS,
     ContactProblem,
     ContactSolution,
     ContactWorkspace,
@@ -23,11 +25,13 @@ from ...numerics.complementarity.contact_problem import (
     empty_problem,
 )
 from ...numerics.complementarity.friction_pyramid import MAX_UNKNOWNS
+from ...numerics.complementarity.solve_history import COLUMNS, solve_history
 from ...numerics.complementarity.solver_choice import PIVOTING_SOLVER
+from ...numerics.thread_team import HelperThreads, new_team
+from ...results.convergence import RESIDUALS, Convergence
 from ...tables.table_definitions import Surfaces, assign, copied, named_arrays
 from .free_bodies import rotation_matrices
 from .mechanism_step import mechanism_kernel
-from .solve_recorder import SolveRecorder
 from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
 from .stepping_tables import (
     NO_SOLUTION,
@@ -52,6 +56,10 @@ MOST_HALVINGS = 6  # of a step that has no solution
 MOST_IMPACT_HALVINGS = 12  # halvings of a step that is too long for the impacts of compliant contacts
 REST_SHARE = 1e-2  # largest residual, relative to the velocity that gravity causes in a step
 GROWTH_FACTOR = 1.5  # size of enlarged tables, relative to the size needed
+
+
+DIVIDED_BODIES = 2000  # number of free bodies from which contacts are divided into slabs, for any number of threads
+LAYERS = 3  # of bodies in a slab: a half slab is thicker than a body, so that contacts cross one border
 
 
 class NoSolution(Exception):
@@ -87,28 +95,40 @@ def make_workspaces(
     A: MechanismTables,
     state: SteppingState,
     solver: str,
+    team: np.ndarray,
     old: StepWorkspaces | None = None,
 ) -> StepWorkspaces:
     """Create workspaces for this number of contacts; contact history and velocities are taken from ``old``."""
-    groups, lines = len(A.group) - 1, len(A.active)
-    P = empty_problem(contacts, len(node), groups, lines, int(A.count.needed), turning)._replace(node=node)
+    groups, lines, slabs = len(A.group) - 1, len(A.active), slab_count(len(node))
+    P = empty_problem(contacts, len(node), groups, lines, int(A.count.needed), turning)._replace(
+        node=node, half_slab=np.zeros(len(node) if slabs else 0, np.int64)
+    )
     P.group[:] = A.group
     hard = {"mu": np.zeros(contacts), "soft": np.zeros(contacts), "turn": np.zeros((0, 2))}
     Q = P._replace(bias=np.zeros((contacts, 3)), **hard)
     R = P._replace(at=np.zeros((contacts, 2), np.int64), bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
     X, W, O, _ = allocate_solver(P)
+    O.count.slabs = slabs
     Y, E = allocate_solver(Q)[0], allocate_solver(P)[0]
     if old is not None:
         X.v[:], X.wide[:] = old.X.v, old.X.wide
         O = old.O
     Z = allocate_solver(P)[0]._replace(v=X.v, wide=X.wide)
-    F = bind_solvers(solver, (P, Q, R), X, W, O, state)
+    F = bind_solvers(solver, (P, Q, R), X, W, O, state, team)
     kept = [ContactMemory.blank(contacts) for _ in range(2)]
     if old is not None:
         for a, b in zip(kept, (old.T.memory, old.U.memory), strict=True):
             a[: len(b)] = b
         solver_counts(F)[:] += solver_counts(old.F)
     return StepWorkspaces(P, Q, R, X, Y, Z, E, W, O, F, StoredContacts(kept[0]), StoredContacts(kept[1]))
+
+
+def slab_count(bodies: int) -> int:
+    """Number of slabs of so many bodies, with some `LAYERS` of them each if they fill a cube; 0 for few bodies.
+
+    It is even, so that two threads have equally many.
+    """
+    return 2 * min(MOST_SLABS // 2, round(bodies ** (1.0 / 3.0) / (2 * LAYERS))) if bodies >= DIVIDED_BODIES else 0
 
 
 def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> FreeBodies:
@@ -187,6 +207,8 @@ class ImpulseStepper:
         Of the cone problems, by its name in ``numerics/complementarity/solver_choice.py``.
     joints : MechanismTables, optional
         The jointed mechanism: the movers after the free bodies.
+    threads : int
+        Number of threads, where contacts are divided among them.
     """
 
     def __init__(
@@ -200,8 +222,10 @@ class ImpulseStepper:
         margin: float,
         solver: str = "auto",
         joints: MechanismTables | None = None,
+        threads: int = 1,
     ) -> None:
         n = len(free.body)
+        self.team, self.threads = new_team(), threads
         self.geometry, self.laws, self.state = geometry, laws, state
         self.joints = no_mechanism() if joints is None else joints
         count = n + len(self.joints.mover)
@@ -214,7 +238,7 @@ class ImpulseStepper:
         turning = bool((laws.pair[..., 3:5] > 0.0).any())
         self.solver = solver
         self.workspaces = make_workspaces(
-            len(self.finder.now.at), problem_nodes(free), turning, self.joints, state, solver
+            len(self.finder.now.at), problem_nodes(free), turning, self.joints, state, solver, self.team
         )
         self.workspaces.X.v[:, :6] = velocity
         self.turning = turning
@@ -309,7 +333,8 @@ class ImpulseStepper:
             if not self._arguments:
                 self._arguments = self._loop_arguments()
                 self._addresses = [x.address for x in self._arguments]
-            status = step_loop_kernel.call(*self._addresses)
+            with HelperThreads(self.team, self.threads - 1 if self.workspaces.O.count.slabs > 1 else 0):
+                status = step_loop_kernel.call(*self._addresses)
             if self.recorder is not None:
                 self.recorder.raise_error()
             needed = self.workspaces.O.count.needed_numbers if self.solver == PIVOTING_SOLVER else 0
@@ -369,8 +394,9 @@ class ImpulseStepper:
             found |= {name: copied(x) for name, x in saved.finder.items()}
             self.joints.count.needed = len(saved.workspaces["P"].J)
             self.workspaces = make_workspaces(
-                len(self.finder.now.at), self.workspaces.P.node, self.turning, self.joints, self.state, self.solver
-            )
+                len(self.finder.now.at), self.workspaces.P.node, self.turning, self.joints, self.state, self.solver,
+                self.team,
+            )  # fmt: skip
             self._arguments, work = [], vars(self.workspaces)
         for name, values in saved.finder.items():
             assign(found[name], values)
@@ -389,10 +415,75 @@ class ImpulseStepper:
     def _enlarged_workspaces(self, contacts: int) -> StepWorkspaces:
         """Return workspaces for this number of contacts that continue from the present ones."""
         r = self.workspaces
-        return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.state, self.solver, r)
+        return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.state, self.solver, self.team, r)
 
     def last(self) -> tuple[ContactTable, ContactMemory]:
         """Return the contacts of the last step, and their history."""
         if self.state.counts.steps_taken % 2 == 1:
             return self.finder.now, self.workspaces.T.memory
         return self.finder.before, self.workspaces.U.memory
+
+
+SOLVER_CALL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64)
+SAME_TIME = 1e-9  # of a step: tolerance of the ends of a time range
+
+
+class SolveRecorder:
+    """Calls the solver of the velocities, and records its residuals over the iterations where they are wanted.
+
+    The last solve of a step counts: compliant contacts need several, and a step is repeated when tables were too small.
+
+    Parameters
+    ----------
+    stepper : ImpulseStepper
+    wanted : "all", int or (float, float)
+        All steps, every n-th step, or those that end within a time range [s].
+    """
+
+    def __init__(self, stepper: ImpulseStepper, wanted: str | int | tuple[float, float]) -> None:
+        self.stepper, self.wanted = stepper, wanted
+        self.histories: dict[int, tuple[float, np.ndarray]] = {}  # by the number of the step: its end, residuals
+        self._callback = SOLVER_CALL(self._solve)
+        self.address = int(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
+        self._solver = 0
+        self._error: BaseException | None = None
+
+    def raise_error(self) -> None:
+        """Raise what went wrong while a solve was recorded; compiled code cannot pass it on."""
+        if self._error is not None:
+            raise self._error
+
+    def attach(self) -> None:
+        """Take the solver's place; again after tables were enlarged, because they bind the solver anew."""
+        addresses = self.stepper.state.addresses
+        if int(addresses.velocities) != self.address:
+            self._solver = int(addresses.velocities)
+            addresses.velocities = self.address
+
+    def _is_wanted(self, step: int, end: float) -> bool:
+        if isinstance(self.wanted, str):
+            return True
+        if isinstance(self.wanted, int):
+            return step % self.wanted == 0
+        slack = SAME_TIME * float(self.stepper.state.times.step)
+        return self.wanted[0] - slack <= end <= self.wanted[1] + slack
+
+    def _solve(self, *words: int) -> int:
+        """Solve, as the solver would: called by the step loop."""
+        s, r = self.stepper, self.stepper.workspaces
+        step, end = int(s.state.counts.steps_taken), float(s.state.times.now + s.state.times.step)
+        try:
+            if (r.P.size[0] or r.P.size[3]) and self._is_wanted(step, end):
+                self.histories[step] = end, solve_history(s.solver, r.P, copied(r.X), r.O)
+        except BaseException as error:  # Ctrl-C too: an exception in a callback would be lost
+            self._error = error
+        return int(SOLVER_CALL(self._solver)(*words))
+
+    def convergence(self) -> Convergence:
+        """Return all residuals recorded."""
+        found = list(self.histories.values())
+        rows = np.concatenate([np.zeros((0, COLUMNS)), *(rows for _, rows in found)])
+        begin = np.cumsum([0, *(len(rows) for _, rows in found)])
+        ends = np.array([end for end, _ in found])
+        columns = dict(zip(("iteration", *RESIDUALS), rows.T, strict=True))
+        return Convergence(ends, begin, solver=self.stepper.solver, **columns)

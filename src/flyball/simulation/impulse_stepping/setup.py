@@ -32,6 +32,7 @@ from ...model.names import curve_parts
 from ...numerics.integrators.butcher_tableaux import tableau
 from ...numerics.integrators.time_loop import StateVectors, StepCounts, StepReals, StepState
 from ...numerics.sparse_factorisation import COLUMNS
+from ...numerics.thread_team import default_threads
 from ...results.events import cumulative_exchanges, energies_at_end
 from ...results.health import Health
 from ...results.result import Result
@@ -45,9 +46,8 @@ from ...tables.values import Values
 from ..initial_state import InitialState, find_initial_state, initial_state_at
 from ..integration_intervals import Segment
 from ..integration_options import DEFAULT_DIRECTIONS, PYRAMIDS, RESTITUTION_LAWS, Stepping
-from .impulse_stepper import ImpulseStepper, free_bodies
+from .impulse_stepper import ImpulseStepper, SolveRecorder, free_bodies
 from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
-from .solve_recorder import SolveRecorder
 from .stepping_tables import (
     LINE_FRICTION,
     LINE_ROPE,
@@ -633,7 +633,9 @@ def make_stepper(
     options.compliant = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], CONTACT_MARGIN * size
-    stepper = ImpulseStepper(scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints)
+    stepper = ImpulseStepper(
+        scene.geometry, free, at, twist, scene.surfaces, state, margin, o.solver, joints, o.threads or default_threads()
+    )
     if o.solver in PYRAMIDS and stepper.turning:
         raise ModelError(
             f"solver {o.solver!r} of Stepping has no rolling or spinning friction; leave rolling_friction and "

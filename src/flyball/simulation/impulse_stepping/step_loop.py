@@ -25,6 +25,7 @@ from ...compiler.kernels import kernel
 from ...math.vec import add, cross, dot, load3, load9, mm, store3, sub, transpose
 from ...numerics.complementarity.contact_operator import apply_contact_impulse, contact_velocity
 from ...numerics.complementarity.contact_problem import (
+    BLOCK_KERNEL,
     CONVERGED,
     ContactProblem,
     ContactSolution,
@@ -32,10 +33,10 @@ from ...numerics.complementarity.contact_problem import (
     SolverSettings,
 )
 from ...numerics.complementarity.solver_choice import SMALL_ISLAND_SOLVER, IslandSolver, prepare_solver
+from ...numerics.thread_team import call_chunks
 from ...tables.table_definitions import Surfaces
 from .contact_constraints import (
-    account_contact,
-    account_rolling,
+    account_contacts,
     bias_persistent_contacts,
     fill_rows,
     find_persistent_contacts,
@@ -57,7 +58,6 @@ from .contact_laws import (
     find_impacts,
     law_is_met,
     linearise_compliant_rows,
-    remaining_gap,
     resolve_impacts,
     restore_free_velocities,
     start_compliant_rows,
@@ -66,6 +66,7 @@ from .contact_laws import (
 from .free_bodies import (
     clear_velocities,
     displace_bodies,
+    divide_space,
     mean_velocities,
     start_from_free_velocities,
     velocities_without_contact,
@@ -73,6 +74,7 @@ from .free_bodies import (
 from .stepping_tables import (
     MIDDLE_FOUND,
     NO_SOLUTION,
+    PARTS,
     STEP_TOO_LONG,
     TABLES_FULL,
     TASK_APPLY_IMPULSES,
@@ -107,9 +109,11 @@ def bind_solvers(
     W: ContactWorkspace,
     O: SolverSettings,
     state: SteppingState,
+    team: np.ndarray,
 ) -> StepSolvers:
     """Bind a solver for velocities, positions and impacts; its addresses are stored in ``state.addresses``."""
-    found = [prepare_solver(name, P, X, W, O) for P in problems]
+    found = [prepare_solver(name, P, X, W, O, team) for P in problems]
+    team[CONTACT_KERNEL] = contact_kernel.address
     to = state.addresses
     to.velocities, to.positions, to.impacts = (one.kernel.address for one in found)
     return StepSolvers(*(one.F for one in found))
@@ -184,6 +188,66 @@ def call_mechanism(A, M, C, P, X, state, task):
     return call(state.addresses.mechanism, A, M, C, P, X, task)
 
 
+FILL_ROWS, FIND_PERSISTENT, WARM_START, ACCOUNT = range(4)  # works on contacts one by one
+CONTACT_KERNEL = BLOCK_KERNEL + 1  # place of the address of `contact_kernel` in the team of threads
+
+
+@kernel
+def contact_kernel(
+    G: Geometry,
+    M: Movers,
+    C: ContactTable,
+    D: ContactTable,
+    P: ContactProblem,
+    Q: ContactProblem,
+    R: ContactProblem,
+    X: ContactSolution,
+    Y: ContactSolution,
+    N: FreeBodies,
+    L: Surfaces,
+    state: SteppingState,
+    T: StoredContacts,
+    U: StoredContacts,
+    task: int,
+) -> int:
+    """Do work task // PARTS on part task % PARTS of the contacts."""
+    work, part, parts = task // PARTS, task % PARTS, parts_of_contacts(P)
+    contacts = C.count.found * part // parts, C.count.found * (part + 1) // parts
+    now, before = T.memory, U.memory
+    if work == FILL_ROWS:
+        fill_rows(G, M, C, P, L, state, contacts)
+    elif work == FIND_PERSISTENT:
+        state.parts.wanted[part] = find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, contacts)
+    elif work == WARM_START:
+        warm_start(C, P, X, now, before, contacts)
+        static_friction_of_sticking(G, C, P, L, X, state, now, contacts)
+    else:
+        account_contacts(C, P, Q, R, X, Y, state, now, part, contacts)
+    return 0
+
+
+@formula
+def parts_of_contacts(P):
+    """Return the number of parts into which contacts are divided."""
+    return PARTS if P.half_slab.shape[0] > 0 else 1
+
+
+@formula
+def work_on_contacts(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U, work):
+    """Do a work on all contacts, on all threads; return the number of parts."""
+    team, parts = F.velocities.team, parts_of_contacts(P)
+    call_chunks(team, team[CONTACT_KERNEL], (G, M, C, D, P, Q, R, X, Y, N, L, state, T, U), work * PARTS, parts)
+    return parts
+
+
+@formula
+def fill_all_rows(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U):
+    """Fill the contact problem except impulses and masses; its sizes too."""
+    P.size[0] = C.count.found
+    P.island[0], P.island[1] = 0, C.count.found
+    work_on_contacts(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U, FILL_ROWS)
+
+
 @formula
 def free_velocities_of_all(A, M, C, P, X, N, state):
     """Compute the velocities of all bodies at the end of the step without contact."""
@@ -193,13 +257,13 @@ def free_velocities_of_all(A, M, C, P, X, N, state):
 
 
 @formula
-def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, state, now, before):
+def solve_velocities(G, A, C, D, P, Q, R, X, Y, W, O, F, N, M, L, state, T, U):
     """Solve the cone problem for the velocities at the end of the step, and record its residual.
 
     Returns DONE, or STEP_TOO_LONG for compliant contacts, before anything is solved.
     """
-    warm_start(C, P, X, now, before)
-    static_friction_of_sticking(G, C, P, L, X, state, now)
+    now, before = T.memory, U.memory
+    work_on_contacts(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U, WARM_START)
     yielding = state.options.compliant != 0 and find_compliant_contacts(G, C, P, L, X, state, now, before)
     start_from_free_velocities(N, M, X)
     call_mechanism(A, M, C, P, X, state, TASK_BEGIN)
@@ -246,30 +310,24 @@ def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, state, now, before):
 
 
 @formula
-def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now):
+def solve_positions(G, A, M, C, D, P, Q, R, X, Y, W, O, F, N, L, state, T, U):
     """Compute the displacements that leave no overlap, and close the gaps of persistent contacts, from mean velocities.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. The works of
     impulses are accounted for here, since the mean velocities are available.
     """
-    h = state.times.step
+    now = T.memory
     mean_velocities(N, X, Y)
     call_mechanism(A, M, C, P, Y, state, TASK_MEAN_VELOCITIES)
     deepest = A.real.overrun if state.addresses.mechanism != 0 else 0.0
-    for c in range(C.count.found):
-        u = contact_velocity(P, Y.v, Y.wide, c)
-        gap = C.x.gap[c] + h * u[0]
-        if now.stiffness[c] > 0.0:
-            gap = remaining_gap(now, c, gap)
-        else:
-            state.worst.overlap = min(state.worst.overlap, C.x.gap[c])
-        deepest = min(deepest, -abs(gap) if now.persistence[c] == MIDDLE_FOUND else gap)
-        Q.bias[c, 0] = R.bias[c, 0] = gap / h
-        account_contact(P, X, c, u, state, now)
-        if P.turn.shape[0] > 0:
-            account_rolling(P, X, Y, c, state, now)
-        for i in range(3):
-            Y.p[c, i] = 0.0
+    s, parts = state.sums, state.parts
+    for k in range(work_on_contacts(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U, ACCOUNT)):
+        s.friction_loss += parts.friction_loss[k]
+        s.impact_loss += parts.impact_loss[k]
+        s.surface_work += parts.surface_work[k]
+        s.numerical_loss += parts.numerical_loss[k]
+        deepest = min(deepest, parts.deepest[k])
+        state.worst.overlap = min(state.worst.overlap, parts.overlap[k])
     if state.counts.steps_taken == 0:
         state.worst.overlap_at_start = state.worst.overlap
     clear_velocities(Y)
@@ -412,8 +470,9 @@ def copy_contact(C, c, H, k):
 
 
 @formula
-def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, now):
+def resolve_all_impacts(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U):
     """Resolve impacts repeatedly, since one impact may cause others nearby. Returns a status."""
+    now = T.memory
     clear_impact_impulses(C, now)
     for _ in range(IMPACT_ROUNDS):
         if not find_impacts(G, C, P.at, P.bias, R, X, L, state, now):
@@ -428,7 +487,7 @@ def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, n
         status = search_again(G, M, C, H, B, Z, state, now)
         if status != DONE:
             return status
-        fill_rows(G, M, C, P, L, state)
+        fill_all_rows(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U)
         if call_mechanism(A, M, C, P, X, state, TASK_ROWS) != DONE:
             return TABLES_FULL
     state.counts.endless_impacts += 1
@@ -436,12 +495,12 @@ def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, n
 
 
 @formula
-def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, state, now, before, hit):
-    """Set the rows of persistent contacts in the middle of the step; see `contact_constraints`. Returns a status.
-
-    hit: whether there were impacts.
-    """
-    if not find_persistent_contacts(G, M, C, D, N, P, X, L, state, now, before, (A.count.first, hit)):
+def continue_contacts(G, A, M, C, D, H, B, P, Q, R, X, Y, F, N, L, state, T, U):
+    """Set the rows of persistent contacts in the middle of the step; see `contact_constraints`. Returns a status."""
+    now, before, wanted = T.memory, U.memory, 0.0
+    for k in range(work_on_contacts(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U, FIND_PERSISTENT)):
+        wanted += state.parts.wanted[k]
+    if wanted == 0.0:
         return DONE
     move_half_step(N, M, X, state.times.step)
     call_mechanism(A, M, C, P, X, state, TASK_POSES)
@@ -460,18 +519,18 @@ def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, state, now, before, hit):
 
 
 @formula
-def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before):
+def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U):
     """Take one time step; if it fails, the state at its start is restored. Returns a status."""
     save_start(N, M, X)
     sums = energies_and_counts(A, state)
-    status = attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before)
+    status = attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U)
     if status != DONE:
         restore_start(N, M, A, X, state, sums)
     return status
 
 
 @formula
-def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, now, before):
+def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U):
     """Compute impacts, velocities and displacements for `take_step`. Returns a status."""
     if free_velocities_of_all(A, M, C, P, X, N, state) != DONE:
         return NO_SOLUTION
@@ -479,23 +538,23 @@ def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state,
     status = call(state.addresses.search, G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
-    fill_rows(G, M, C, P, L, state)
+    divide_space(M, P.half_slab, W.slab_bins, 2 * O.count.slabs)
+    fill_all_rows(G, M, C, D, P, Q, R, X, Y, F, N, L, state, T, U)
     if call_mechanism(A, M, C, P, X, state, TASK_ROWS) != DONE:
         return TABLES_FULL
     before_impacts = state.counts.impacts
-    status = resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, state, now)
+    status = resolve_all_impacts(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U)
     if status != DONE:
         return status
-    status = continue_contacts(
-        G, A, M, C, D, H, B, N, P, X, L, state, now, before, state.counts.impacts > before_impacts
-    )
+    state.counts.first_struck = A.count.first if state.counts.impacts > before_impacts else M.pose.shape[0]
+    status = continue_contacts(G, A, M, C, D, H, B, P, Q, R, X, Y, F, N, L, state, T, U)
     if status != DONE:
         return status
-    status = solve_velocities(G, A, C, P, X, W, O, F, N, M, L, state, now, before)
+    status = solve_velocities(G, A, C, D, P, Q, R, X, Y, W, O, F, N, M, L, state, T, U)
     if status != DONE:
         return status
-    solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, state, now)
-    if finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, now) != DONE:
+    solve_positions(G, A, M, C, D, P, Q, R, X, Y, W, O, F, N, L, state, T, U)
+    if finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, state, T.memory) != DONE:
         return NO_SOLUTION
     displace_bodies(N, M, X, Y.v, state)
     call_mechanism(A, M, C, P, X, state, VELOCITIES_AFTER)
@@ -512,9 +571,9 @@ def run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T,
     """Run the steps; see `step_loop_kernel`."""
     while state.counts.steps_left > 0:
         if state.counts.steps_taken % 2 == 0:
-            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T.memory, U.memory)
+            status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, T, U)
         else:
-            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, U.memory, T.memory)
+            status = take_step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, state, U, T)
         if status != DONE:
             return status
     return DONE

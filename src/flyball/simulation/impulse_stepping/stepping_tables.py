@@ -125,6 +125,21 @@ class RunExtremes(Record, kind="Float"):
     last_residual: float  # of the last solve for velocities [m/s]
 
 
+class PartSums(Record, kind="Float", rows=True):
+    """Results of the parts into which the contacts of a step are divided, which threads may compute at once."""
+
+    friction_loss: Column  # energies as in `RunSums`
+    impact_loss: Column
+    surface_work: Column
+    numerical_loss: Column
+    deepest: Column  # smallest gap (< 0) at the end of the step [m]
+    overlap: Column  # smallest gap (< 0) at its start [m]
+    wanted: Column  # whether rows in the middle of the step are wanted
+
+
+PARTS = 16  # of the contacts of a step, if they are divided
+
+
 class RunOptions(Record, kind="Int"):
     """Options of a run."""
 
@@ -147,6 +162,7 @@ class RunCounts(Record, kind="Int"):
     impacts: int
     reduced_expansions: int
     endless_impacts: int  # steps whose impacts did not end
+    first_struck: int  # first mover of a mechanism that had an impact before the step
 
 
 class RunAddresses(Record, kind="Int"):
@@ -166,6 +182,7 @@ class SteppingState(NamedTuple):
     times: RunTimes
     tolerances: RunTolerances
     sums: RunSums
+    parts: PartSums
     worst: RunExtremes
     options: RunOptions
     counts: RunCounts
@@ -175,8 +192,8 @@ class SteppingState(NamedTuple):
 def initial_run_state(gravity: np.ndarray) -> SteppingState:
     """Return the state of a run in which nothing is set but gravity."""
     return SteppingState(
-        np.array(gravity, float), RunTimes.blank(), RunTolerances.blank(), RunSums.blank(), RunExtremes.blank(),
-        RunOptions.blank(), RunCounts.blank(), RunAddresses.blank(),
+        np.array(gravity, float), RunTimes.blank(), RunTolerances.blank(), RunSums.blank(), PartSums.blank(PARTS),
+        RunExtremes.blank(), RunOptions.blank(), RunCounts.blank(), RunAddresses.blank(),
     )  # fmt: skip
 
 
