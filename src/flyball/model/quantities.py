@@ -266,6 +266,8 @@ def _of_force(model: Model, e: Force, axes: str) -> Table:
     if isinstance(e, PathForce):
         inner = range(1, len(e.bodies) - 1)
         out |= {f"load_{k + 1}": Quantity("N", curve=k in inner, array=True) for k in range(len(e.bodies))}
+        if getattr(e, "friction", None) is not None:
+            out |= {f"tension_{k}": Quantity("N", curve=True, array=True) for k in range(1, len(e.bodies))}
         for k, radius in enumerate(getattr(e, "radii", None) or ()):
             if radius != 0.0:
                 out[f"wrap_{k + 1}"] = Quantity("rad", curve=True, array=True)
