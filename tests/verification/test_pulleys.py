@@ -449,6 +449,14 @@ def test_a_wheel_is_turned_by_a_rope_that_sticks_or_slips(mu):
         assert torque[late] == pytest.approx(R * 2 * (G + a) * (ratio - 1), rel=1e-3)
 
 
+def test_equilibrium_within_the_cone():
+    ratio = np.exp(0.3 * np.pi)
+    e = bollard(0.9 * 2 * ratio).equilibrium()
+    assert e["rope.tension_1"] == pytest.approx(2 * G, rel=1e-8)
+    assert e["rope.tension_2"] == pytest.approx(0.9 * 2 * ratio * G, rel=1e-8)
+    assert e["rope_slip.slip"] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_friction_in_files_and_groups():
     m = bollard(30.0, friction=(0, "mu", 0))
     assert loads(dumps(m), fb.Mechanism, "bollard.toml") == m
