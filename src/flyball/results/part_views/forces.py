@@ -174,7 +174,7 @@ class ForceView(PartView):
         return getattr(self.element, "friction", None) is not None
 
     @cached_property
-    def tensions(self) -> list[np.ndarray]:
+    def _tensions(self) -> list[np.ndarray]:
         """For a rope: the tension of each straight part over time [N], (n,)."""
         e, count = self.element, len(self.element.bodies) - 1
         if not self._slips:
@@ -190,7 +190,7 @@ class ForceView(PartView):
         moving = (length - (b - a) * x for k, (length, x, (a, b)) in enumerate(parts, 1) if f"{e.name}_{k}" in model)
         pulls = [self._result[name] for k in (1, 2) if (name := f"{e.name}_pull_{k}") in model]
         length = sum((x.value for x in pulls), sum(drawn.lengths) + drawn.arcs(n.radii) - sum(moving) + zero)
-        tension = np.maximum(self.tensions[0], self.tensions[-1])
+        tension = np.maximum(self._tensions[0], self._tensions[-1])
         return length, sum((x.rate for x in pulls), zero), -tension, np.where(tension > 0.0, 1.0, 0.0)
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -251,7 +251,7 @@ class ForceView(PartView):
         """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
         x = self.course
         forces = [np.zeros_like(p) for p in x.centres]
-        for k, (u, tension) in enumerate(zip(x.pulls, self.tensions, strict=True)):
+        for k, (u, tension) in enumerate(zip(x.pulls, self._tensions, strict=True)):
             forces[k] += u * tension[:, None]
             forces[k + 1] -= u * tension[:, None]
         return list(zip(x.centres, forces, strict=True))
@@ -336,7 +336,7 @@ class ForceView(PartView):
         if name.startswith("wrap_"):
             return self.wraps[int(name.removeprefix("wrap_")) - 1]
         if name.startswith("tension_"):
-            return self.tensions[int(name.removeprefix("tension_")) - 1]
+            return self._tensions[int(name.removeprefix("tension_")) - 1]
         if name not in outputs:
             return self._whole[name == "torque"]
         if self.element.figures is not None:
