@@ -457,6 +457,18 @@ def test_equilibrium_within_the_cone():
     assert e["rope_slip.slip"] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_events_of_a_rope_with_friction():
+    """Its tensions are signals of its slip; it cannot be released, as it has no limit."""
+    m = bollard(30.0)
+    m.add(fb.Event("tight", "rope_slip.tension_2 > 100", do=[fb.Stop()]))
+    r = m.simulate(1.0)
+    assert r["rope.tension_2"][-1] == pytest.approx(100, rel=1e-6)
+    with pytest.raises(ModelError, match="Rope 'rope' has friction, and forces in place of a limit"):
+        m.add(fb.Event("cut", "t > 0.1", do=[fb.Release("rope")]))
+    with pytest.raises(ModelError, match=r"'rope.tension' is known only after the accelerations are"):
+        m.add(fb.Event("tight", "rope.tension > 100", do=[fb.Stop()]))
+
+
 def test_friction_in_files_and_groups():
     m = bollard(30.0, friction=(0, "mu", 0))
     assert loads(dumps(m), fb.Mechanism, "bollard.toml") == m

@@ -73,6 +73,11 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
         return LockTarget(joint=a.what)
     if found is not None and (found.category == "limits" or getattr(found, "single", "") == "rope"):
         parts = [p.name for p in found.parts(model) if p.category == "limits"]
+        if not parts and not found.switches():
+            raise ModelError(
+                f"{what}: {found.title} has friction, and forces in place of a limit; set a parameter in its stiffness "
+                "and damping with fb.Set, or give it no friction"
+            )
         return LockTarget(element=parts[0] if parts else a.what)
     if driver := _driver_of(model, found):
         _refuse_sensors(model, what, driver)
