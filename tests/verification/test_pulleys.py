@@ -466,7 +466,7 @@ def test_events_of_a_rope_with_friction():
     with pytest.raises(ModelError, match="Rope 'rope' has friction, and forces in place of a limit"):
         m.add(fb.Event("cut", "t > 0.1", do=[fb.Release("rope")]))
     with pytest.raises(ModelError, match=r"'rope.tension' is known only after the accelerations are"):
-        m.add(fb.Event("tight", "rope.tension > 100", do=[fb.Stop()]))
+        m.add(fb.Event("over", "rope.tension > 100", do=[fb.Stop()]))
 
 
 def test_friction_in_files_and_groups():
