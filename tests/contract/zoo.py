@@ -80,17 +80,18 @@ PLANAR = {
 SPLINED = ("Cam", "FlatFacedCam", "PointOnCurve")  # third derivatives of their curves jump
 AS_DRAWN = {
     "LinearActuator": lambda e, what: np.linalg.norm(np.subtract(*e.at)),
-    "RopeSpan": lambda e, what: _span_as_drawn(e) if what == "length" else 0.0,
+    "RopeSpan": lambda e, what: _span_as_drawn(e)[what],
 }
 """Value of the coordinate as drawn, of joints whose coordinates are not 0 there."""
 
 
-def _span_as_drawn(e) -> float:
-    """Length of the tangent of two circles, less the difference of their radii times its direction."""
+def _span_as_drawn(e) -> dict[str, float]:
+    """Length of the tangent of two circles, less the difference of their radii times its direction; position."""
     d, b = np.subtract(*e.at[::-1]), e.radii[1] - e.radii[0]
     x, y, z = d @ NORMAL if len(d) == 3 else (*d, 0.0)
     along, across = np.sqrt(x * x + y * y - b * b), np.arctan2(y, x)
-    return np.hypot(along, z) - b * (across - np.arcsin(b / np.hypot(x, y)))
+    length = np.hypot(along, z) - b * (across - np.arcsin(b / np.hypot(x, y)))
+    return {"length": length, "angle": 0.0, "x": x, "y": y}
 
 
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]

@@ -98,7 +98,7 @@ UNFIT = [
     (fb.Lock("B"), r"Lock of 'B': there is no part named 'B'; name a joint, a coordinate"),
     (fb.Lock("rod"), r"Body 'rod' has the coordinates x, y, angle; name one, as in 'rod.x'"),
     (fb.Lock("A.x"), r"no coordinate 'x'; it has angle"),
-    (fb.Release("turned"), r"Sensor 'turned' is no joint, coordinate, limit or rope"),
+    (fb.Release("turned"), r"Sensor 'turned' is no joint, coordinate, driver, limit or rope"),
     (
         [fb.Lock("A"), fb.Release("A.angle")],
         r"Lock of 'A' and Release of 'A.angle' are both in do, and they contradict",

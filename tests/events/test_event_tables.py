@@ -11,7 +11,7 @@ from flyball.constraints.switches.lock import LOCK
 from flyball.constraints.switches.switch_kind import G_LAW, HELD
 from flyball.engine.entry_point import MOTION
 from flyball.engine.guards import evaluate_guards
-from flyball.tables.constraint_rows import joint_row_name, released_joints
+from flyball.tables.constraint_rows import released_joints, released_row_name
 from flyball.tables.coordinate_choice import spanning_joints
 from flyball.tables.table_definitions import EITHER, FALLING, RISING
 
@@ -78,7 +78,7 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     J = c.jacobian()
     nr = len(S.rows.law)
     for k, row in enumerate(range(rows.start, rows.stop)):
-        m = s.measured[joint_row_name(s.model["W"], k)]
+        m = s.measured[released_row_name(s.model["W"], k)]
         assert c.work.sensed.value[m] == pytest.approx(c.work.rows.value[row], abs=1e-12)
         gradient = np.zeros(s.nv)
         at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])

@@ -333,3 +333,172 @@ def test_a_rope_that_leaves_its_pulley_is_named(rise):
     assert ((run["rope.wrap_2"] < 0) == leaves).all()
     named = [w for w in run.health.warnings if "it has left the pulley on 'ground' (point 2)" in w]
     assert len(named) == leaves.any()
+
+
+def bollard(heavy, *, mu=0.3, turns=0, planar=True, light=2.0, radius=None, **rope):
+    """Masses on an elastic rope around a fixed cylinder, half a turn and more, with friction."""
+
+    def p(x, y):
+        return (x, y) if planar else tuple((TURNED @ (x, y, 0.0)).tolist())
+
+    about, axis = (0.1, {}) if planar else ((0.1,) * 3, {"axis": tuple(TURNED[:, 2].tolist())})
+    m = fb.Mechanism("bollard", planar=planar, gravity=p(0, -G), parameters={"r": R, "mu": mu, "heavy": heavy})
+    for name, mass, x in (("a", light, -R), ("b", "heavy", R)):
+        m.add(fb.Body(name, mass=mass, inertia=about, position=p(x, -1)))
+        m.add(fb.Prismatic(f"{name}_guide", "ground", name, at=p(x, -1), axis=p(0, 1)))
+    own = {"stiffness": 2e4, "damping": 400, "friction": "mu"} | rope
+    at, radii = (p(-R, -1), p(0, 0), p(R, -1)), (0, radius or "-r", 0)
+    m.add(fb.Rope("rope", ("a", "ground", "b"), at=at, radii=radii, turns=(0, turns, 0), **axis, **own))
+    return m
+
+
+@pytest.mark.parametrize(("planar", "turns"), [(True, 0), (True, 2), (False, 1)])
+@pytest.mark.parametrize("lowered", [True, False])
+def test_a_rope_slips_around_a_bollard(planar, turns, lowered):
+    """Euler and Eytelwein: T_2 = exp(mu wrap) T_1 in the direction of slip; the heavier mass accelerates evenly."""
+    wrap = np.pi + 2 * np.pi * turns
+    ratio = np.exp(0.1 * wrap) if lowered else np.exp(-0.1 * wrap)
+    heavy = 1.5 * 2 * ratio if lowered else 2 / 1.5 * ratio
+    r = bollard(heavy, mu=0.1, turns=turns, planar=planar).simulate(0.5)
+    a = G * (heavy - 2 * ratio) / (heavy + 2 * ratio)
+    late = r.t > 0.35
+    assert (r["rope.tension_2"] / r["rope.tension_1"])[late] == pytest.approx(ratio, rel=1e-9)
+    assert r["b_guide.displacement_acceleration"][late] == pytest.approx(-a, rel=1e-4)
+    assert r["rope.tension_1"][late] == pytest.approx(2 * (G + a), rel=1e-4)
+    assert r["rope.tension"] == pytest.approx(np.maximum(r["rope.tension_1"], r["rope.tension_2"]), rel=1e-12)
+    assert r["rope.wrap_2"] == pytest.approx(wrap, rel=1e-9)
+    assert r["rope_slip.wrap"] == pytest.approx(wrap, rel=1e-9)
+    assert r["rope.load_2"] == pytest.approx(r["rope.tension_1"] + r["rope.tension_2"], rel=1e-9)
+    assert r["rope.length"][0] == pytest.approx(2.0 + R * wrap, rel=1e-12)
+    speed = np.abs(r["rope_slip.rate"])
+    heat = np.abs(r["rope.tension_2"] - r["rope.tension_1"]) * speed
+    assert r["rope_slip.heat"][-1] == pytest.approx(np.trapezoid(heat, r.t), rel=1e-3)
+    assert np.abs(r["energy.balance"]).max() < 1e-5
+    assert r["rope.work"][-1] < -r["rope_slip.heat"][-1]  # with the loss of its damping, and what stretches it
+
+
+@both_layers
+def test_a_small_force_holds_a_load_on_a_windlass():
+    """Within the cone the rope sticks: three and a half turns hold 60 times the weight, at rest."""
+    ratio = np.exp(0.2 * 7 * np.pi)
+    r = bollard(0.7 * 2 * ratio, mu=0.2, turns=3).simulate(4.0)
+    assert np.abs(r["b_guide.displacement_rate"][-1]) < 1e-5
+    assert r["rope.tension_2"][-1] == pytest.approx(0.7 * ratio * 2 * G, rel=1e-4)
+    assert r["rope.tension_1"][-1] == pytest.approx(2 * G, rel=1e-4)
+    assert r["rope_slip.rate"][r.t > 3.0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_rope_that_is_belayed_stays_within_the_cone():
+    """From a fixed end around a post to a load, with a straight part that does not move, and a rope that goes slack."""
+    m = fb.Mechanism("belay", planar=True, gravity=(0, -G))
+    m.add(fb.Body("b", mass=5, inertia=0.1, position=(R, -1)))
+    m.add(fb.Prismatic("guide", "ground", "b", at=(R, -1), axis=(0, 1)), fb.Initial("guide.displacement", rate=1.0))
+    at = ((-1, R), (0, 0), (R, -1))
+    rope = {"radii": (0, -R, 0), "stiffness": 2e4, "damping": 400, "friction": (0, 0.25, 0)}
+    m.add(fb.Rope("rope", ("ground", "ground", "b"), at=at, **rope))
+    r = m.simulate(2.0)
+    one, two, ratio = r["rope.tension_1"], r["rope.tension_2"], np.exp(0.25 * np.pi / 2)
+    assert np.all(two <= one * ratio * (1 + 1e-9) + 1e-9)
+    assert np.all(one <= two * ratio * (1 + 1e-9) + 1e-9)
+    flight = r.t < 2.0 / G
+    assert r["guide.displacement"][flight] == pytest.approx((r.t - 0.5 * G * r.t**2)[flight], abs=1e-8)
+    assert two[flight].max() == r["rope.taut"][flight].max() == 0.0
+    assert two[-1] == pytest.approx(5 * G, rel=1e-3)
+    assert np.abs(r["energy.balance"]).max() < 1e-4
+
+
+def test_band_brake():
+    """A band around half of a wheel that is driven: T_1 + T_2 keep their sum, and the torque is r (T_1 - T_2)."""
+    mu, tight = 0.2, 0.01
+    m = fb.Mechanism("band", planar=True)
+    m.add(fb.Body("wheel", mass=3, inertia=0.02), fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    m.add(fb.Motor("motor", "axle", speed="-4"), fb.Initial("axle.angle", rate=-4))
+    at, free = ((-R, -1), (0, 0), (R, -1)), 2.0 + np.pi * R - tight
+    own = {"stiffness": 2e4, "damping": 50, "friction": mu, "length": float(free)}
+    m.add(fb.Rope("band", ("ground", "wheel", "ground"), at=at, radii=(0, -R, 0), **own))
+    r = m.simulate(3.0)
+    assert r["axle.angle"][-1] == pytest.approx(-12.0, abs=1e-6)
+    assert r["band.wrap_2"] == pytest.approx(np.pi, rel=1e-9)
+    late, pull = r.t > 1.0, 2e4 * tight
+    most, ratio = 2 * pull / (1 + np.exp(-mu * np.pi)), np.exp(mu * np.pi)
+    assert r["band.tension_1"][late] == pytest.approx(most, rel=1e-6)
+    assert r["band.tension_2"][late] == pytest.approx(most / ratio, rel=1e-6)
+    assert -r["motor.torque"][late] == pytest.approx(R * 2 * pull * np.tanh(mu * np.pi / 2), rel=1e-6)
+
+
+@both_layers
+@pytest.mark.parametrize("mu", [0.5, 0.02])
+def test_a_wheel_is_turned_by_a_rope_that_sticks_or_slips(mu):
+    """It turns with the rope: (m_a + m_b + J / r^2) a = (m_b - m_a) g; or by r (T_2 - T_1), less than the rope moves."""
+    J, ratio = 0.02, np.exp(mu * np.pi)
+    m = atwood(stiffness=4e4, damping=800, friction=mu)
+    m = m.changed({"rope": None})
+    m.add(fb.Body("wheel", mass=1, inertia=J), fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    ends = (-R, -4), (0, 0), (R, -4)
+    m.add(fb.Rope("rope", ("a", "wheel", "b"), at=ends, radii=(0, "-r", 0), stiffness=4e4, damping=800, friction=mu))
+    r = m.simulate(0.8)
+    late, torque = r.t > 0.6, R * (r["rope.tension_2"] - r["rope.tension_1"])
+    assert r["axle.angle_acceleration"] == pytest.approx(-torque / J, rel=1e-8, abs=1e-8)
+    if mu > 0.1:
+        a = G / (5 + J / R**2)
+        assert r["rope_slip.slip"] == pytest.approx(0.0, abs=1e-2)
+        assert r["axle.angle_acceleration"][late] == pytest.approx(-a / R, rel=1e-3)
+    else:
+        a = G * (3 - 2 * ratio) / (3 + 2 * ratio)
+        assert r["b_guide.displacement_acceleration"][late] == pytest.approx(-a, rel=1e-3)
+        assert torque[late] == pytest.approx(R * 2 * (G + a) * (ratio - 1), rel=1e-3)
+
+
+def test_equilibrium_within_the_cone():
+    ratio = np.exp(0.3 * np.pi)
+    e = bollard(0.9 * 2 * ratio).equilibrium()
+    assert e["rope.tension_1"] == pytest.approx(2 * G, rel=1e-8)
+    assert e["rope.tension_2"] == pytest.approx(0.9 * 2 * ratio * G, rel=1e-8)
+    assert e["rope_slip.slip"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_events_of_a_rope_with_friction():
+    """Its tensions are signals of its slip; it cannot be released, as it has no limit."""
+    m = bollard(30.0)
+    m.add(fb.Event("tight", "rope_slip.tension_2 > 100", do=[fb.Stop()]))
+    r = m.simulate(1.0)
+    assert r["rope.tension_2"][-1] == pytest.approx(100, rel=1e-6)
+    with pytest.raises(ModelError, match="Rope 'rope' has friction, and forces in place of a limit"):
+        m.add(fb.Event("cut", "t > 0.1", do=[fb.Release("rope")]))
+    with pytest.raises(ModelError, match=r"'rope.tension' is known only after the accelerations are"):
+        m.add(fb.Event("over", "rope.tension > 100", do=[fb.Stop()]))
+
+
+def test_friction_in_files_and_groups():
+    m = bollard(30.0, friction=(0, "mu", 0))
+    assert loads(dumps(m), fb.Mechanism, "bollard.toml") == m
+    assert "slip" not in dumps(m)
+    whole = fb.Mechanism("pair", planar=True, gravity=(0, -G))
+    whole.add(m, prefix="one")
+    whole.add(m, prefix="two", mirror="x", at=(4, 0))
+    r, alone = whole.simulate(0.1), m.simulate(0.1)
+    for name in ("one", "two"):
+        assert r[f"{name}.rope.tension_2"][-1] == pytest.approx(alone["rope.tension_2"][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fields", "why"),
+    [
+        ({"friction": -0.1}, "friction is -0.1; it must not be negative"),
+        ({"friction": (0, 0.1)}, "friction has 2 numbers; give one, or one for each of 3 points"),
+        ({"friction": (0.1, 0, 0)}, "friction 1 is 0.1; there is none at a point or at an end"),
+        ({"radii": (0, 0, 0)}, "there is friction at no pulley between its ends; it is possible at one"),
+        ({"radii": None}, "friction acts around pulleys and cylinders; give their radii="),
+        ({"stiffness": None, "damping": 0}, "Of inextensible ropes it is not available"),
+        ({"damping": 0}, "give stiffness= and damping="),
+        ({"feed": "t"}, "feed and friction are both given"),
+        ({"name": "the rope"}, "give it a name of one word"),
+    ],
+)
+def test_refused_friction(fields, why):
+    m = fb.Mechanism("m", planar=True)
+    m.add(fb.Body("load", mass=1, inertia=1, position=(1.2, -2)))
+    own = {"at": ((0, 0), (1, 0.5), (1.2, -2)), "radii": (0, -0.2, 0), "friction": 0.2, "stiffness": 1e4, "damping": 9}
+    own = {"name": "rope", "bodies": ("ground", "ground", "load")} | own | fields
+    with pytest.raises(ModelError, match=why):
+        m.add(fb.Rope(**own))

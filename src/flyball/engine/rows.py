@@ -250,7 +250,8 @@ def direction_column(S, W, s):
 def apply_switch_modes(S, W):
     """Apply the modes of switches to their rows.
 
-    Rows that are off are cleared; the values of held rows are measured from their hold.
+    Rows that are off are cleared; the values of held rows are measured from their hold, angles that follow a law modulo
+    a whole turn.
     """
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
@@ -260,10 +261,13 @@ def apply_switch_modes(S, W):
             for e in range(S.row_start[k], S.row_start[k + 1]):
                 W.G[e] = 0.0
             W.rows.value[k] = 0.0
+            W.rows.nu[k] = 0.0
+            W.rows.nu_dot[k] = 0.0
         elif W.modes.mode[s].real == STEADY:
             W.rows.value[k] = 0.0
         else:
-            W.rows.value[k] -= W.modes.hold[s]
+            g = W.rows.value[k] - W.modes.hold[s]
+            W.rows.value[k] = atan2(sin(g), cos(g)) if S.rows.wrapped[k] == 1 else g
 
 
 @formula
@@ -310,7 +314,6 @@ def update_measured_rates(S, W, v):
 @formula
 def end_biases(S, W, t):
     """End of the biases: gamma of laws that read sensors uses f'' along the motion in place of the time derivative."""
-    clear_inactive_biases(S, W)
     for k in range(S.rows.law.shape[0]):
         if S.rows.wrapped[k] == OF_RATE:
             _, f1, _ = evaluate_jet(S.code, S.const, S.rows.law[k], W.stack, t, W.sensed, ALONG_MOTION)
@@ -322,6 +325,7 @@ def end_biases(S, W, t):
             _, _, f2 = evaluate_jet(S.code, S.const, S.rows.law[k], W.stack, t, W.sensed, ALONG_MOTION)
             W.rows.gamma[k] += f2 - W.rows.nu_dot[k]
         last = k
+    clear_inactive_biases(S, W)
 
 
 @formula

@@ -30,12 +30,14 @@ from ..model.element import (
     Unit,
     element,
     nonnegative,
+    resolve,
 )
 from ..model.force import PathForce, Switch, check_elastic
 from ..model.joint import WorldFrame
+from .bushing import PerAxis
 from .limit import Limit, stop_switch_numbers
-from .motor import LITTLE
-from .rope_geometry import drawn_rope, is_backward, is_point, pulley_axes
+from .motor import LITTLE, Actuator
+from .rope_geometry import RopeSlip, RopeTexts, drawn_rope, is_backward, is_point, pulley_axes
 
 if TYPE_CHECKING:
     from ..constraints.blocks import Row
@@ -123,7 +125,7 @@ class PulleyLimit(LengthLimit):
 
 @element
 class Rope(PathForce):
-    """A rope that runs without friction over points of bodies: the tension is the same everywhere.
+    """A rope over points of bodies and around pulleys: the tension is the same everywhere, except for friction.
 
     With a stiffness it is elastic: the tension is k (l - length) + c ldot while the rope is longer than its free length
     and this is positive; otherwise it is slack. Without a stiffness it is inextensible: when it becomes taut at the
@@ -138,10 +140,16 @@ class Rope(PathForce):
     end with a radius is fixed to its body, a drum: the rope is wound on it as the body turns, over any number of turns,
     and the torque is tension times radius. A pulley that turns with the rope and has inertia is the end of two ropes.
 
+    With ``friction`` an elastic rope slips around one pulley, drum or fixed cylinder where the ratio of the tensions on
+    both sides reaches exp(friction * wrap), with the wrap of the instant, and sticks to its surface below (Euler 1762,
+    Eytelwein 1808). Both sides stretch, each with the stiffness of its part of the length as drawn. If the body of the
+    pulley turns, the rope turns it by the difference of the tensions times the radius.
+
     A rope with winch, feed or radii consists of elements of its own, which decide what an analysis makes of it:
     coordinates ``NAME_1``, ``NAME_2``, ... of its straight parts (`LinearActuator`, next to a pulley `RopeSpan`), a
     `Limit` ``NAME_limit`` of their sum with the rope on the drum, and for ``feed`` a slide ``NAME_feed`` on ground with
-    a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``.
+    a body ``NAME_end`` of 1e-6 kg and its `Driver` ``NAME_drive``. With friction the `Limit` is replaced by the slip
+    ``NAME_slip`` with its two states, and an `Actuator` for each side, ``NAME_pull_1`` and ``NAME_pull_2``.
 
     Parameters
     ----------
@@ -174,13 +182,19 @@ class Rope(PathForce):
     axis : direction
         In space: axis of all pulleys, about which the rope runs, in world coordinates of the drawn configuration. The
         pulleys, and the points next to them, are in a plane across it as drawn.
+    friction : number [1], or list of numbers
+        With ``radii``: coefficient of friction around the pulley between the ends, or a list with one number for each
+        point, of which one is not zero. Requires stiffness and damping.
 
     Notes
     -----
     A result contains the ``length`` of the path, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack;
     ``load_1``, ``load_2``, ...: the magnitude of the force on each point, such as the bearing of a pulley; with
     ``radii`` also ``wrap_1``, ``wrap_2``, ...: the angle around each centre [rad]. The ``length`` of such a rope
-    includes its arcs and the rope on its drums, less the rope paid out by ``feed``.
+    includes its arcs and the rope on its drums, less the rope paid out by ``feed``. With ``friction`` also
+    ``tension_1``, ``tension_2``, ... of each straight part, ``tension`` being the largest; and ``rate``, ``slip`` [m]
+    and ``heat`` [J] of ``NAME_slip``: the slip relative to the surface of the pulley, positive towards the first end,
+    and the work lost in friction since the start.
 
     A wrap below zero means that the rope has left the pulley, which is not modelled: the motion goes on as if the
     pulley could pull, and ``health.warnings`` names rope, pulley and time. In space
@@ -197,6 +211,7 @@ class Rope(PathForce):
     radii: Annotated[Numbers | None, Unit("m")] = None
     turns: Annotated[Numbers | None, Unit("1")] = None
     axis: Direction | None = None
+    friction: Annotated[PerAxis | None, Unit("1")] = None
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
@@ -225,6 +240,8 @@ class Rope(PathForce):
             self._check_pulleys(n)
         elif self.turns is not None or self.axis is not None:
             raise ModelError(f"{self.title}: turns and axis are those of pulleys; give their radii=, or leave both out")
+        elif self.friction is not None:
+            raise ModelError(f"{self.title}: friction acts around pulleys and cylinders; give their radii=")
         elif self._winds() and n.length is None and n.at is None:
             raise ModelError(f"{self.title}: its points are frames; give its free length too: length=")
 
@@ -252,6 +269,48 @@ class Rope(PathForce):
                     "and not negative"
                 )
         drawn_rope(self, n)
+        if self.friction is not None:
+            self._check_friction(n)
+
+    def _check_friction(self, n: SimpleNamespace) -> None:
+        """Require one pulley with friction, and an elastic rope with damping."""
+        count = len(self.bodies)
+        each = n.friction if isinstance(n.friction, tuple) else (n.friction,) * count
+        if len(each) != count:
+            raise ModelError(
+                f"{self.title}: friction has {len(each)} numbers; give one, or one for each of {count} points"
+            )
+        if any(mu.real < 0.0 for mu in each):
+            raise ModelError(f"{self.title}: friction is {self.friction}; it must not be negative")
+        for k, (mu, r) in enumerate(zip(each, n.radii, strict=True)):
+            if isinstance(n.friction, tuple) and mu and (not r or k in (0, count - 1)):
+                raise ModelError(f"{self.title}: friction {k + 1} is {mu:g}; there is none at a point or at an end")
+        at = self.slips_at()
+        if len(at) != 1:
+            where = f"at points {', '.join(str(k + 1) for k in at)}" if at else "at no pulley between its ends"
+            raise ModelError(
+                f"{self.title}: there is friction {where}; it is possible at one. Give a list with zeros, "
+                "friction=(0, 0.3, 0, 0), or divide the rope at a small body between two pulleys"
+            )
+        if n.stiffness is None or not n.damping.real > 0.0:
+            raise ModelError(
+                f"{self.title}: friction around pulleys needs a rope that stretches, and damping, which gives the rate "
+                "of its slip; give stiffness= and damping=. Of inextensible ropes it is not available"
+            )
+        if self.feed is not None:
+            raise ModelError(
+                f"{self.title}: feed and friction are both given; wind the rope on a drum, an end with a radius"
+            )
+        if not all(word.isidentifier() for word in self.name.split(".")):
+            raise ModelError(f"{self.title}: its parts occur in expressions; give it a name of one word")
+
+    def slips_at(self) -> tuple[int, ...]:
+        """Return the points (from 0) of pulleys that it slips around with friction."""
+        if self.friction is None or self.radii is None:
+            return ()
+        each = self.friction if isinstance(self.friction, tuple) else (self.friction,) * len(self.bodies)
+        inner = range(1, len(self.bodies) - 1)
+        return tuple(k for k in inner if not is_point(self.radii[k]) and not is_point(each[k]))
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
         """Return the points in the reference configuration, of pulleys with z along the axis."""
@@ -266,6 +325,8 @@ class Rope(PathForce):
 
     def measured_with(self) -> str:
         """Return the limit that measures its length, if it has pulleys."""
+        if self.friction is not None:
+            return f"{self.name}_slip"
         return "" if self.radii is None else f"{self.name}_limit"
 
     def examine(self, model: Model) -> None:
@@ -302,6 +363,8 @@ class Rope(PathForce):
         own: Any = {"stiffness": self.stiffness, "damping": self.damping, "restitution": self.restitution}
         own |= {"weights": weights}
         limit = f"{self.name}_limit"
+        if self.friction is not None:
+            return (*out, *self._slipping(model, [moves for *_, moves in spans]))
         if self.radii is not None:
             own |= {"at": self.at, "radii": self.radii, "turns": self.turns or (0.0,) * len(self.radii)}
             own |= {"axis": self.axis, "fixed": tuple(k - 1 for k, _, _, moves in spans if not moves)}
@@ -313,6 +376,36 @@ class Rope(PathForce):
         else:
             length = self.length
         return (*out, LengthLimit(limit, coordinates, upper=length, **own))
+
+    def _slipping(self, model: Model, moves: list[bool]) -> tuple[Element, ...]:
+        """Return the slip around the pulley with friction, and the forces of both sides."""
+        (i,) = self.slips_at()
+        texts = RopeTexts(self, resolve(self, model.environment()))
+        share, longer = texts.share(i), "0" if self.length is None else f"({texts.length()} - ({self.length}))"
+        friction = self.friction[i] if isinstance(self.friction, tuple) else self.friction
+        slip, own, pulls = f"{self.name}_slip", dict[str, Any](), list[Element]()
+        for side, part, ks in ((1, share, range(i)), (2, 1.0 - share, range(i, len(moves)))):
+            sums = [("", " + ".join(texts.value(k) for k in ks if moves[k]) or "0"), ("_rate", "0")]
+            at = [x for k in ks if moves[k] for x in self._coordinates_of(k + 1)]
+            for ending, drawn in sums:
+                own[f"{'rate' if ending else 'stretch'}_{side}"] = " + ".join(
+                    [*(f"({weight})*{name}{ending}" for name, weight in at), f"(-({drawn}))"]
+                )
+            own[f"stretch_{side}"] += f" + {part!r}*{longer}"
+            for name in ("stiffness", "damping"):
+                own[f"{name}_{side}"] = f"({getattr(self, name)})/{part!r}"
+            if at:
+                names, weights = zip(*at, strict=True)
+                pull = f"-{slip}.tension_{side}"
+                pulls.append(Actuator(f"{self.name}_pull_{side}", names, weights=weights, force=pull))
+        own |= {"turned": texts.wrap(i, (moves[i - 1], moves[i])), "middle": float(texts.drawn.wraps[i].real)}
+        return (RopeSlip(slip, friction=friction or 0.0, **own), *pulls)
+
+    def _coordinates_of(self, k: int) -> list[tuple[str, Any]]:
+        """Return the coordinates of straight part k (from 1), with their weights in the length."""
+        a, b = self.radii[k - 1 : k + 1] if self.radii is not None else (0.0, 0.0)
+        turns = [] if is_point(b) or is_backward(a, b) else [(f"{self.name}_{k}.angle", b)]
+        return [(f"{self.name}_{k}.length", 1.0), *turns]
 
     def _part(self, k: int, ends: tuple[str, str], at: Any) -> tuple[Element, Any]:
         """Return straight part k (from 1), and the weight of its angle if that counts in the length."""
@@ -349,8 +442,8 @@ class Rope(PathForce):
         )
 
     def transmitted(self) -> str:
-        """Return the curve of the limit that carries its tension; empty if it acts itself."""
-        return f"{self.name}_limit.force" if self._winds() else ""
+        """Return the curve of the limit that carries its tension; empty if it acts itself, or by several tensions."""
+        return f"{self.name}_limit.force" if self._winds() and self.friction is None else ""
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Return the parameters of the formulas."""

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
 from ..constraints.angle import unwrapped
-from ..constraints.blocks import ANGLE, TANGENT
+from ..constraints.blocks import ANGLE, TANGENT, shift
 from ..constraints.tangent import tangent
 from ..errors import ModelError
 from ..math.vec import matrix_product
@@ -21,7 +21,8 @@ class RopeSpan(Joint):
 
     It constrains nothing. Its coordinate ``length`` is that of the part, less the rope that it has wound on both
     pulleys since their reference directions as it swings; ``angle`` is that of ``body_j`` relative to ``body_i``;
-    ``place`` is the direction of the part in the frame of ``body_i``, with full turns [rad].
+    ``x`` and ``y`` are the position of the second centre relative to the first, in the plane of the pulleys and in axes
+    of ``body_i``; ``place`` is the direction of the part in the frame of ``body_i``, with full turns [rad].
 
     Parameters
     ----------
@@ -39,7 +40,12 @@ class RopeSpan(Joint):
     at: PointPair | None = None  # type: ignore[assignment]
     radii: Annotated[Numbers, Unit("m")] = (0.0, 0.0)
 
-    coordinates: ClassVar = {"length": Coordinate(TANGENT), "angle": Coordinate(ANGLE)}
+    coordinates: ClassVar = {
+        "length": Coordinate(TANGENT),
+        "angle": Coordinate(ANGLE),
+        "x": Coordinate(shift("x")),
+        "y": Coordinate(shift("y")),
+    }
     needs_axis: ClassVar[bool] = True
     handed: ClassVar[tuple[str, ...]] = ("radii",)
     axial: ClassVar[bool] = True

@@ -96,7 +96,9 @@ class Lock(Action):
     ----------
     what : str
         A joint (all its coordinates), or one coordinate, ``"A.angle"`` or ``"slider.x"``. Also a joint, limit or rope
-        that was released: it becomes active again.
+        that was released: it becomes active again. Or a driver that was released: it prescribes its coordinate again,
+        by the changes of its law from the value at that instant, q = q0 + law(t) - law(t0), and an impulse gives the
+        prescribed rate.
     """
 
     what: Name = field(kw_only=False)
@@ -108,12 +110,13 @@ class Lock(Action):
 
 @element
 class Release(Action):
-    """Unlock what was locked; or deactivate a joint that no event locks, a limit or a rope.
+    """Unlock what was locked; or deactivate a joint that no event locks, a driver, a limit or a rope.
 
     Parameters
     ----------
     what : str
-        A joint or coordinate that some event locks; another joint, whose bodies then separate; a limit; a rope.
+        A joint or coordinate that some event locks; another joint, whose bodies then separate; a limit; a rope; a
+        driver, or a motor or actuator of given speed, which then neither prescribes its coordinate nor has an effort.
     """
 
     what: Name = field(kw_only=False)

@@ -11,6 +11,7 @@ from .controller_signals import controller_states
 from .element import LawOf, si_numbers
 from .event import START, Action, Event, Impulse, Lock, Release, Set, Stop, comparison_sides, component_list
 from .expressions import is_number_text
+from .force import Force
 from .joint import Joint
 from .messages import listing, suggest
 from .names import curve_parts, is_curve
@@ -31,17 +32,20 @@ class LockTarget:
         Locked coordinates, each with its own row: ``"A.angle"``.
     joint : str
         Or the joint whose own rows are switched on or off.
+    driver : str
+        Or the driver that is switched on or off.
     element : str
         Or the limit or rope that is switched on or off.
     """
 
     coordinates: tuple[str, ...] = ()
     joint: str = ""
+    driver: str = ""
     element: str = ""
 
     def keys(self) -> tuple[str, ...]:
         """Return what must not be locked and released at the same instant."""
-        return self.coordinates or (self.joint or self.element,)
+        return self.coordinates or (self.joint or self.driver or self.element,)
 
 
 def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
@@ -69,12 +73,20 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
         return LockTarget(joint=a.what)
     if found is not None and (found.category == "limits" or getattr(found, "single", "") == "rope"):
         parts = [p.name for p in found.parts(model) if p.category == "limits"]
+        if not parts and not found.switches():
+            raise ModelError(
+                f"{what}: {found.title} has friction, and forces in place of a limit; set a parameter in its stiffness "
+                "and damping with fb.Set, or give it no friction"
+            )
         return LockTarget(element=parts[0] if parts else a.what)
+    if driver := _driver_of(model, found):
+        _refuse_sensors(model, what, driver)
+        return LockTarget(driver=driver.name)
     if found is None:
-        known = [*(j.name for j in model.joints), *(x.name for x in model.limits)]
+        known = [*(j.name for j in model.joints), *(d.name for d in model.drivers), *(x.name for x in model.limits)]
         raise ModelError(
             f"{what}: there is no part named {a.what!r}{suggest(a.what, known)}; "
-            f"name a joint, a coordinate such as 'A.angle', a limit or a rope"
+            f"name a joint, a coordinate such as 'A.angle', a driver, a limit or a rope"
         )
     if isinstance(found, (Body, Frame)):
         own = tuple(found.measured(model.planar))
@@ -83,9 +95,28 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
             "with a Fixed joint that another event releases"
         )
     raise ModelError(
-        f"{what}: {found.title} is no joint, coordinate, limit or rope; a force is switched off by fb.Set of a "
+        f"{what}: {found.title} is no joint, coordinate, driver, limit or rope; a force is switched off by fb.Set of a "
         f"parameter in its numbers or laws"
     )
+
+
+def _driver_of(model: Model, found: Any) -> Driver | None:
+    """Return a driver, or that of an element which consists of one and other parts, such as a motor of given speed."""
+    if isinstance(found, Driver):
+        return found
+    parts = found.parts(model) if isinstance(found, Force) else ()
+    return next((p for p in parts if isinstance(p, Driver)), None)
+
+
+def _refuse_sensors(model: Model, what: str, driver: Driver) -> None:
+    """Refuse a driver of a position whose law reads sensors: its row depends on what they measure."""
+    law = model.law(driver.law, LawOf(model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
+    sensors = sorted(law.names & {x.name for x in model.sensors}) if law is not None else []
+    if sensors and not driver.of_rate:
+        raise ModelError(
+            f"{what}: the law of {driver.title} reads {', '.join(sensors)}, and events switch drivers of positions "
+            "only where the law is one of time; prescribe the rate, or use an Actuator or a Motor"
+        )
 
 
 def _locked_somewhere(model: Model, e: Event, names: set[str]) -> bool:

@@ -266,6 +266,8 @@ def _of_force(model: Model, e: Force, axes: str) -> Table:
     if isinstance(e, PathForce):
         inner = range(1, len(e.bodies) - 1)
         out |= {f"load_{k + 1}": Quantity("N", curve=k in inner, array=True) for k in range(len(e.bodies))}
+        if getattr(e, "friction", None) is not None:
+            out |= {f"tension_{k}": Quantity("N", curve=True, array=True) for k in range(1, len(e.bodies))}
         for k, radius in enumerate(getattr(e, "radii", None) or ()):
             if radius != 0.0:
                 out[f"wrap_{k + 1}"] = Quantity("rad", curve=True, array=True)
@@ -316,12 +318,17 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
         if model.planar and what in ("fx", "fy", "force", "torque"):
             return TransmittedForce(e, SPIN if what == "torque" else WRENCH.index(what))
         return TransmittedForce(e, WRENCH.index(what)) if what in WRENCH and not model.planar else None
-    if isinstance(e, CoordinateForce) and what in list(e.outputs)[2:3]:
+    if isinstance(e, CoordinateForce) and what in list(e.outputs)[2:3] and not _has_signals(model, e):
         if other := e.transmitted():
             return transmitted_force(model, other)
         way = getattr(e, "direction", 1.0)  # as results tell it
         return None if isinstance(way, str) else TransmittedForce(e, 0 if e.sign * way > 0.0 else 1)
     return TransmittedForce(e, 0) if isinstance(e, Driver) and what == "effort" else None
+
+
+def _has_signals(model: Model, e: CoordinateForce) -> bool:
+    """Return whether a controller that belongs to a force has what laws may read of it: of a rope with friction."""
+    return isinstance(model.find(e.measured_with()), Controller)
 
 
 class Curve(NamedTuple):
@@ -364,6 +371,8 @@ def measured_quantity(model: Model, e: Sensor | Curve) -> tuple[str, str, int] |
             return "coordinate", f"{owner}.{name}", 0
         name = name.removesuffix("_rate")
         return ("coordinate", f"{owner}.{name}", 1) if name in own else None
+    if isinstance(found, CoordinateForce) and _has_signals(model, found):
+        return None
     if isinstance(found, (TwoPointForce, CoordinateForce)) and what in found.outputs:
         order = list(found.outputs).index(what)
         return ("force", owner, order) if order < 2 else None

@@ -100,7 +100,9 @@ def coordinate_image(
     """
     poses = _poses(chain, rest)
     old = np.array([_value(coordinates[what], M) for M in poses])
-    alike = [k for k, c in coordinates.items() if c.unit == coordinates[what].unit and k != what]
+    alike = [
+        k for k, c in coordinates.items() if c.unit == coordinates[what].unit and k != what and not c.row.of_kind.place
+    ]
     for name, sign in itertools.product([what, *alike], (1.0, -1.0)):
         shift = np.array([_value(coordinates[name], image(M)) for M in poses]) - sign * old
         if coordinates[what].unit == "rad":

@@ -16,7 +16,7 @@ import numpy as np
 from ..compiler.kernels import CodeTable, code_table
 from ..constraints.blocks import ConstraintRow, Row
 from ..constraints.registry import SIGNATURES
-from ..constraints.switches.lock import LOCK
+from ..constraints.switches.lock import EVENT_DRIVER, LOCK
 from ..constraints.switches.switch_kind import (
     DISC,
     G_LAW,
@@ -30,7 +30,7 @@ from ..model.body import Body, Driver, Frame, Initial, Located
 from ..model.contact_point import Touch
 from ..model.element import Element, LawOf
 from ..model.event import Event, Impulse, Lock, Release
-from ..model.event_validation import coordinate_of, lock_target
+from ..model.event_validation import LockTarget, coordinate_of, lock_target
 from ..model.expression_parser import SyntaxNode
 from ..model.expressions import Expression
 from ..model.force import Force, Switch
@@ -131,7 +131,7 @@ def _prescribed_row(s: Structure, driver: Driver) -> int | None:
     """Row of the body table whose one coordinate a driver prescribes; None for a coordinate that needs a row."""
     owner, what = s.model.coordinate(driver.coordinate, driver)
     alone = sum(d.coordinate == driver.coordinate for d in s.model.drivers) == 1
-    if driver.of_rate or not isinstance(owner, Joint) or not alone:
+    if driver.of_rate or not isinstance(owner, Joint) or not alone or driver in released_drivers(s.model):
         return None
     return coordinate_row(s, owner.name, what)
 
@@ -291,21 +291,33 @@ def lock_switches(model: Model) -> list[tuple[Event, Switch]]:
 
 def released_joints(model: Model) -> list[Joint]:
     """Joints that some event releases: their own rows are switched off, so they cannot be tree joints."""
-    found = [lock_target(model, e, a).joint for e in model.events for a in e.do if isinstance(a, (Lock, Release))]
-    return [model[name] for name in dict.fromkeys(found) if name]
+    return [model[name] for name in dict.fromkeys(x.joint for x in _lock_targets(model)) if name]
 
 
-def joint_row_name(joint: Joint, k: int) -> str:
-    """Name of the measured quantity that is the k-th row of a joint."""
-    return f"{joint.name}:row {k}"
+def released_drivers(model: Model) -> list[Driver]:
+    """Drivers that some event releases: their rows are switched off, so they cannot prescribe a coordinate directly."""
+    return [model[name] for name in dict.fromkeys(x.driver for x in _lock_targets(model)) if name]
+
+
+def _lock_targets(model: Model) -> list[LockTarget]:
+    """All that events lock or release."""
+    return [lock_target(model, e, a) for e in model.events for a in e.do if isinstance(a, (Lock, Release))]
+
+
+def released_row_name(e: Element, k: int) -> str:
+    """Name of the measured quantity that is the k-th row of a joint or driver."""
+    return f"{e.name}:row {k}"
 
 
 def measure_released_rows(s: Structure) -> None:
-    """Measure the quantities of joint rows that events may release."""
+    """Measure the quantities of rows of joints and drivers that events may release."""
+    for driver in released_drivers(s.model):
+        m = s.measured[released_row_name(driver, 0)] = len(s.measured)
+        coordinate_term(s, driver.coordinate, driver, m, measured=True)
     for joint in released_joints(s.model):
         F, M = frame_index(s, joint, "F"), frame_index(s, joint, "M")
         for k, row in enumerate(joint.rows(s.model.planar)):
-            m = s.measured[joint_row_name(joint, k)] = len(s.measured)
+            m = s.measured[released_row_name(joint, k)] = len(s.measured)
             term = TermSpec(m, F, M, row, 1.0, joint, measured=True)
             if hasattr(joint, "nearest"):
                 term.hint = s.state(f"{joint.name}.place")
@@ -399,10 +411,10 @@ def add_switch_rows(s: Structure) -> None:
             like = [i for i in one if i != k and s.switches[i].switch.kind.forces == spec.switch.kind.forces == DISC]
             spec.partner = like[0] if like else -1
 
-    for joint in released_joints(s.model):
-        at = s.slices[joint.name]
+    for e in (*released_joints(s.model), *released_drivers(s.model)):
+        at, kind = s.slices[e.name], LOCK if isinstance(e, Joint) else EVENT_DRIVER
         for k, row in enumerate(range(at.start, at.stop)):
-            spec = SwitchSpec(joint, Switch(LOCK, f"row {k}"), row, s.measured[joint_row_name(joint, k)])
+            spec = SwitchSpec(e, Switch(kind, f"row {k}"), row, s.measured[released_row_name(e, k)])
             spec.held = True
             s.switches.append(spec)
 

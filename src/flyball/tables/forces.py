@@ -79,6 +79,8 @@ def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
             frame_index(s, e, role)
         if isinstance(limit := s.model[other], CoordinateForce):  # at rest a constraint may replace it
             return _acting_quantity(s, limit)
+        if isinstance(limit, Controller):  # it has no sum of its own
+            return -1
     text = e.coordinate_text() or f"{e.name}:length"
     if text in s.measured:
         return s.measured[text]

@@ -219,6 +219,7 @@ class Instant(Protocol):
     mode: np.ndarray  # before the instant
     hold: np.ndarray
     way: np.ndarray
+    engaging: Collection[int]  # drivers that engage at this instant
 
     def ways(self) -> np.ndarray:
         """Return the directions of all switches, writable in place."""
@@ -283,6 +284,11 @@ class SwitchKind:
     def __post_init__(self) -> None:
         """Register its kinds of events."""
         self.transitions.update(kind for kind, _ in (self.closing, self.opening) if kind)
+
+    @property
+    def decided(self) -> bool:
+        """Return whether the problem of an instant decides whether its row is active."""
+        return self.forces != NO_ROW
 
     @property
     def keeps_bounds(self) -> bool:

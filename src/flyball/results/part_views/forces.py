@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,8 @@ class ForceView(PartView):
         The effort of a rigid element without a row, because the motion was computed without it, is unknown: nan.
         """
         s, own = self._x.structure, self._rows()
+        if self._slips:
+            return self._slipping()
         if isinstance(self.element, CoordinateForce) and (other := self.element.measured_with()):
             view = self._result[other]
             return view._whole_along if isinstance(view, ForceView) else self._held()
@@ -164,6 +167,31 @@ class ForceView(PartView):
         drawn = drawn_rope(self.element, n)
         length = sum(drawn.lengths) + drawn.arcs(n.radii) if n.length is None else n.length
         return length + zero, zero, self._transmitted(), 1.0 + zero
+
+    @property
+    def _slips(self) -> bool:
+        """Return whether it is a rope with friction around a pulley, whose tensions differ."""
+        return getattr(self.element, "friction", None) is not None
+
+    @cached_property
+    def _tensions(self) -> list[np.ndarray]:
+        """For a rope: the tension of each straight part over time [N], (n,)."""
+        e, count = self.element, len(self.element.bodies) - 1
+        if not self._slips:
+            return [-self._whole_along[2]] * count
+        (i,) = e.slips_at()
+        return [self._result.channel(f"{e.name}_slip.tension_{1 if k < i else 2}")[1] for k in range(count)]
+
+    def _slipping(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return (length, rate, effort, side) of a rope with friction: of its largest tension."""
+        e, n, model = self.element, self._x.numbers[self.element.name], self._result.model
+        drawn, zero = drawn_rope(e, n), self._result.motions.zeros()
+        parts = zip(drawn.lengths, drawn.places, pairwise(n.radii), strict=True)
+        moving = (length - (b - a) * x for k, (length, x, (a, b)) in enumerate(parts, 1) if f"{e.name}_{k}" in model)
+        pulls = [self._result[name] for k in (1, 2) if (name := f"{e.name}_pull_{k}") in model]
+        length = sum((x.value for x in pulls), sum(drawn.lengths) + drawn.arcs(n.radii) - sum(moving) + zero)
+        tension = np.maximum(self._tensions[0], self._tensions[-1])
+        return length, sum((x.rate for x in pulls), zero), -tension, np.where(tension > 0.0, 1.0, 0.0)
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the values of a law over time."""
@@ -221,9 +249,9 @@ class ForceView(PartView):
     @property
     def pulls(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
-        x, tension = self.course, -self._whole_along[2]
+        x = self.course
         forces = [np.zeros_like(p) for p in x.centres]
-        for k, u in enumerate(x.pulls):
+        for k, (u, tension) in enumerate(zip(x.pulls, self._tensions, strict=True)):
             forces[k] += u * tension[:, None]
             forces[k + 1] -= u * tension[:, None]
         return list(zip(x.centres, forces, strict=True))
@@ -270,6 +298,9 @@ class ForceView(PartView):
     def power(self) -> np.ndarray:
         """Power supplied to the bodies [W]."""
         if isinstance(self.element, CoordinateForce):
+            if self._slips:
+                pulls = (p for p in self.element.parts(self._x.structure.model) if isinstance(p, CoordinateForce))
+                return sum((self._result[p.name].power for p in pulls), self._result.motions.zeros())
             _, rate, effort, _ = self._whole_along
             return rate * effort
         _, force, torque = self._between()
@@ -304,6 +335,8 @@ class ForceView(PartView):
             return np.sqrt((pull * pull).sum(axis=1))
         if name.startswith("wrap_"):
             return self.wraps[int(name.removeprefix("wrap_")) - 1]
+        if name.startswith("tension_"):
+            return self._tensions[int(name.removeprefix("tension_")) - 1]
         if name not in outputs:
             return self._whole[name == "torque"]
         if self.element.figures is not None:

@@ -14,12 +14,12 @@ import numpy as np
 
 from ...assembly.compiled_mechanism import CompiledMechanism
 from ...constraints.switches.switch_kind import FROZEN, HELD, OFF
-from ...engine.entry_point import MOTION, evaluate_state
+from ...engine.entry_point import MOTION, POSITION, evaluate_state
 from ...engine.guards import ForceDistribution, empty_distribution
 from ...errors import SimulationError
 from ...model.contact_point import Touch
 from ...model.event import Event, Lock, Release
-from ...model.event_validation import lock_target
+from ...model.event_validation import LockTarget, lock_target
 from ...numerics.integrators.time_loop import StepState
 from ...results.result import Result
 from ...tables.constraint_rows import SwitchSpec
@@ -91,6 +91,8 @@ class EventContext:
         Switch -> force that is rounding, for the rows of the last mode decision.
     still : tuple of int
         Measured quantities whose rates active rows keep at zero (`mode_selection.held_rates`).
+    engaging : dict
+        Switch -> rate that its driver prescribes: drivers that engage at the instant.
     recorder : PhaseRecorder, optional
         Modes at the output rows so far (`event_loop.PhaseRecorder`).
     """
@@ -114,6 +116,7 @@ class EventContext:
     tied: frozenset[tuple[int, int]] = frozenset()
     least: dict[int, float] = field(default_factory=dict)
     still: tuple[int, ...] = ()
+    engaging: dict[int, float] = field(default_factory=dict)
     recorder: Any = None
     sharing: Any = None
     counts: dict[str, int] = field(default_factory=dict)
@@ -233,7 +236,7 @@ RELEASED = 1.0  # in `Modes.released`: the element was released and is inactive
 
 
 def lock(here: EventContext, e: Event, a: Lock) -> str:
-    """Lock coordinates at their values, lock a closed joint, or reactivate a limit or rope.
+    """Lock coordinates at their values, lock a closed joint, engage a driver, or reactivate a limit or rope.
 
     Raises
     ------
@@ -242,11 +245,14 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
     """
     W, S = here.c.work, here.c.system
     held = lock_target(here.structure.model, e, a)
-    for k in switch_numbers_of(here, held.coordinates, held.joint, held.element):
+    for k in switch_numbers_of(here, held):
         if held.element:
             W.modes.released[k] = 0.0
             W.modes.lower[k], W.modes.upper[k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
             here.given += elastic_energy(here, k)
+            continue
+        if held.driver:
+            engage(here, k)
             continue
         x = W.sensed.value[S.switches.measured[k]]
         if held.joint and abs(x) > CLOSED_TOLERANCE * here.c.values.length:
@@ -258,17 +264,29 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
         if W.modes.mode[k] == OFF:
             W.modes.hold[k] = 0.0 if held.joint else x
         W.modes.mode[k] = HELD
-    return f"{a.what} is in force" if held.element else f"locked {a.what}"
+    return f"{a.what} is in force" if held.element or held.driver else f"locked {a.what}"
+
+
+def engage(here: EventContext, k: int) -> None:
+    """Let a released driver prescribe its coordinate again: its law continues from the present value."""
+    W, row = here.c.work, here.structure.switches[k].row
+    if W.modes.mode[k] != OFF:
+        return
+    W.modes.mode[k], W.modes.hold[k] = HELD, 0.0
+    evaluate_state(*here.c.buffers, here.t, here.y.copy(), POSITION)
+    W.modes.hold[k], here.engaging[k] = W.rows.value[row], float(W.rows.nu[row])
+    W.modes.mode[k] = OFF  # until its impact is resolved
+    here.evaluate()
 
 
 def release(here: EventContext, e: Event, a: Release) -> str:
-    """Release coordinates, a joint, a limit or a rope."""
+    """Release coordinates, a joint, a driver, a limit or a rope."""
     W = here.c.work
     ways = W.sensed.value[W.sensed.shape[1] - W.modes.mode.shape[0] :]
     held, switches = lock_target(here.structure.model, e, a), here.structure.switches
-    every = switch_numbers_of(here, held.coordinates, held.joint, held.element)
+    every = switch_numbers_of(here, held)
     if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
-        return f"{a.what} was {'released already' if held.element else 'not locked'}"
+        return f"{a.what} was {'released already' if held.element or held.driver else 'not locked'}"
     for k in every:
         if held.element:
             here.given -= elastic_energy(here, k)
@@ -288,13 +306,16 @@ def elastic_energy(here: EventContext, k: int) -> float:
     return float(0.5 * S.switch_numbers.stiffness[k] * depth**2)
 
 
-def switch_numbers_of(here: EventContext, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
-    """Return the switches that lock these coordinates, or belong to a joint or element."""
+def switch_numbers_of(here: EventContext, target: LockTarget) -> list[int]:
+    """Return the switches of what an action locks or releases."""
     out = []
+    commanded = target.joint or target.driver
     for k, spec in enumerate(here.structure.switches):
         own = isinstance(spec.element, Event)
-        if (own and spec.switch.label in coordinates) or (
-            not own and spec.element.name == (joint or element) and spec.switch.kind.commanded == bool(joint)
+        if (own and spec.switch.label in target.coordinates) or (
+            not own
+            and spec.element.name == (commanded or target.element)
+            and spec.switch.kind.commanded == bool(commanded)
         ):
             out.append(k)
     return out

@@ -251,12 +251,12 @@ class PhaseRecorder:
 
 
 def _clear_held_rates(here: EventContext, rows: np.ndarray) -> None:
-    """Set the rates of coordinates held by a single row to exactly zero at output rows."""
+    """Set the rates of coordinates that a single row keeps at a value to exactly zero at output rows."""
     S, W, s = here.c.system, here.c.work, here.structure
     first, ny = 1 + s.nq, 1 + len(here.y)
     for k in np.flatnonzero(W.modes.mode == HELD).tolist():
         row = S.switches.row[k]
-        if row >= 0 and S.row_start[row + 1] - S.row_start[row] == 1:
+        if row >= 0 and S.rows.law[row] < 0 and S.row_start[row + 1] - S.row_start[row] == 1:
             column = S.column[S.row_start[row]]
             rows[:, [first + column, ny + column]] = 0.0
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...constraints.switches.switch_kind import BY_RATE, DISC, FROZEN, G_LAW, G_LOWER, G_SHARED, G_UPPER, OFF, ONE_SIDED
 from ...errors import ModelError
+from ...model.body import Driver
 from ...model.contact_point import Touch
 from ...model.joint import Joint
 from ...numerics.complementarity.dense_problem import FRICTION_LINE, HOLD_IMPOSSIBLE, SLIDING
@@ -173,8 +174,8 @@ def record_jump(n: InstantProblem, jumped: VelocityJump, before: np.ndarray) -> 
         done.append(
             f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if not n.kinds[s].commanded else f"{n.name(s)} locks"
         )
-    for s, x in jumped.impulse.items():  # impulses of joints and contact points have components, by their rows
-        if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Joint, Touch)):
+    for s, x in jumped.impulse.items():  # those of joints, drivers and contact points are taken from their rows
+        if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Driver, Joint, Touch)):
             impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
     if jumped.jammed:
         done.append("stops without a collision: no accelerations go with its friction (Painleve's paradox)")

@@ -182,12 +182,14 @@ def poisson_expansion(
 
 def account_for_drivers(n: InstantProblem, out: VelocityJump, drive: np.ndarray) -> None:
     """Append the impulses of drivers to those of the rows, and add their works at the prescribed rates."""
-    S, W, y, rows = n.S, n.W, n.here.y, out.rows
+    S, y, rows = n.S, n.here.y, out.rows
     for s, x in out.impulse.items():
         rows[S.switches.row[s]] = x
+    prescribed = n.W.rows.nu.copy()
+    prescribed[[S.switches.row[s] for s in n.engaging]] = list(n.here.engaging.values())
     z = y[n.here.structure.nq + n.here.structure.nv :]
     for k in np.flatnonzero(S.rows.work >= 0).tolist():
-        z[S.rows.work[k]] += rows[k] * W.rows.nu[k]
+        z[S.rows.work[k]] += rows[k] * prescribed[k]
     efforts: list[float] = []
     for b in np.flatnonzero(S.tree.law >= 0).tolist():
         d = S.tree.v[b]

@@ -10,7 +10,7 @@ SLIDING.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ from ...constraints.switches.switch_kind import (
     G_UPPER,
     HELD,
     INTERVAL,
-    NO_ROW,
     NOT_IN_USE,
     OFF,
     ProblemRow,
@@ -108,6 +107,7 @@ class InstantProblem:
 
     def __init__(self, here: EventContext) -> None:
         c, self.here = here.c, here
+        self.engaging: Collection[int] = here.engaging
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
         self.m = S.switches.measured
@@ -151,7 +151,7 @@ class InstantProblem:
             NOT_IN_USE if gone else x.switch.kind
             for x, gone in zip(self.here.structure.switches, released.tolist(), strict=True)
         ]
-        self.decided = [s for s in self.of(lambda kind: kind.forces != NO_ROW) if self.m[s] >= 0]
+        self.decided = [s for s in self.of(lambda kind: kind.decided) if self.m[s] >= 0]
 
     def _acceleration_rounding(self) -> np.ndarray:
         """Return how the rounding of positions changes the accelerations of switches' quantities, (ns,).
@@ -223,6 +223,15 @@ class InstantProblem:
         self.all.do(STORE_RATES)
         B = self.all.B
         self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.previous + self.least
+        for s, prescribed in self.here.engaging.items():
+            self.rate[s] -= prescribed
+
+    def engage_drivers(self) -> None:
+        """Let the drivers that engage at this instant act as constraints from now on."""
+        if self.engaging:
+            self.mode[list(self.engaging)] = self.W.modes.mode[list(self.engaging)] = HELD
+            self.here.engaging.clear()
+            self.reevaluate_switches()
 
     def switch_off_decided(self) -> None:
         """Switch off all decided switches."""

@@ -19,7 +19,6 @@ from ...constraints.switches.switch_kind import (
     G_UPPER,
     HELD,
     INTERVAL,
-    NO_ROW,
     OFF,
     ONE_SIDED,
     ProblemRow,
@@ -300,7 +299,7 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
     """Write modes, switch states and held values into the motion."""
     W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kinds):
-        if kind.forces != NO_ROW and n.m[s] >= 0:
+        if kind.decided and n.m[s] >= 0:
             W.modes.mode[s] = OFF
             ways[s] = kind.direction(n, s, bool(still[s]), s in taking)
     for i, p in enumerate(found.parts):

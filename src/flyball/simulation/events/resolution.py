@@ -373,6 +373,7 @@ def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
     kick, here.external_impulse = here.external_impulse, None
     blows, here.external_impulses = tuple(here.external_impulses), []
     if kick is None and not violates_rule(n, parts, n.rate):
+        n.engage_drivers()
         return None
     jumped = apply_impulses(n, parts, kick)
     jumped.external_impulses = blows
@@ -380,6 +381,7 @@ def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
         n.restore_modes()
         raise no_admissible_impulses(n, parts)
     here.lost, here.given, here.fresh = here.lost + jumped.lost, here.given + jumped.given, True
+    n.engage_drivers()
     n.reevaluate_switches()
     note_bounces(n, jumped)
     return jumped
