@@ -608,7 +608,8 @@ def allocate_island_solver(P: ContactProblem, whole: bool, team: np.ndarray) -> 
     islands = allocate_islands(nc, nn, ng, nl)
     most = len(islands.island) + 1
     Q = empty_problem(nc, nn, ng, nl, 0, len(P.turn) > 0)._replace(
-        node=P.node, half_slab=P.half_slab, group=P.group, J=P.J, Y=P.Y, columns=P.columns, least=np.zeros(len(P.least)),
+        node=P.node, half_slab=P.half_slab, group=P.group, J=P.J, Y=P.Y, columns=P.columns,
+        least=np.zeros(len(P.least)),
         **{k: np.zeros(most, np.int64) for k in ("island", "member_p", "line_p")},
     )  # fmt: skip
     size = contacts + nodes + nl + wide
