@@ -84,6 +84,7 @@ class CompiledCode:
 
     parameters: Any
     content: Any
+    vectorised = False  # whether loops and straight code use vector instructions
 
     def __init__(
         self, function: Callable[..., Any], first_order: bool = False, signature: Signature | None = None
@@ -529,16 +530,13 @@ class Kernel(CompiledCode):
 
     Attributes
     ----------
-    vectorised : bool
-        Whether loops and straight code are vectorised. This pays where kernels spend their time in rows of numbers;
-        others compile longer and gain nothing.
     parameters : tuple
         Layouts of its parameters; `int` and `float` are numbers.
     """
 
     def __init__(self, function: Callable[..., Any], first_order: bool = False, vectorised: bool = False) -> None:
         super().__init__(function, first_order)
-        self.vectorised = vectorised
+        self.vectorised = vectorised  # pays where kernels spend their time in rows of numbers
         KERNELS.append(self)
 
     @cached_property
