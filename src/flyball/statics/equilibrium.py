@@ -317,6 +317,7 @@ def _refuse_with_contact(o: EquilibriumOptions) -> None:
 def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
     """The equilibrium or end of a motion to start from, with its controller states; None if not given."""
     if isinstance(o.start, Result):
+        _refuse_other_mechanism(model, o.start)
         s = o.start.values.structure
         q, v, z = np.split(o.start.final[1], [s.nq, s.nq + s.nv])
         return Assembly(CompiledMechanism(o.start.values, z.copy()), o.start.final[0], q, v)
@@ -328,6 +329,13 @@ def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
     raise ModelError(
         f"start must be an equilibrium of {model.name!r}, or a result of simulate, not {type(o.start).__name__}"
     )
+
+
+def _refuse_other_mechanism(model: Model, run: Result) -> None:
+    """Refuse a motion of a mechanism with other bodies, joints or controllers."""
+    own, other = ([[e.name for e in x] for x in (m.bodies, m.joints, m.controllers)] for m in (model, run.model))
+    if own != other:
+        raise ModelError(f"the result of {run.model.name!r} cannot be continued: the mechanism is a different one")
 
 
 def _search_start(a: Assembly, guess: Assembly | None) -> Assembly:

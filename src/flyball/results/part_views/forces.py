@@ -18,7 +18,7 @@ from ...laws.bytecode import STACK_RESERVE, evaluate
 from ...laws.interval_evaluation import evaluate_over_time, read_steps, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import cross, dot, norm, sub
-from ...model.force import CoordinateForce, JointForce
+from ...model.force import CoordinateForce, JointForce, PathForce
 from ...model.joint import Coupling
 from ...model.names import curve_parts
 from ..contacts import ContactHistory
@@ -171,7 +171,7 @@ class ForceView(PartView):
     @property
     def _slips(self) -> bool:
         """Return whether it is a rope with friction around a pulley, whose tensions differ."""
-        return getattr(self.element, "friction", None) is not None
+        return isinstance(self.element, PathForce) and getattr(self.element, "friction", None) is not None
 
     @cached_property
     def _tensions(self) -> list[np.ndarray]:
