@@ -235,8 +235,8 @@ def unwrapped_rope_warnings(result: Result) -> list[str]:
             if r != 0.0 and apart.any():
                 found.append(
                     f"{e.title}: it has left the pulley on {e.bodies[k]!r} (point {k + 1}) at t = "
-                    f"{result.t[int(np.argmax(apart))]:.4g} s, where its wrap is below zero; from there on the motion "
-                    "is wrong, because the pulley pulls it. Give the rope more turns, or end the motion before"
+                    f"{result.t[int(np.argmax(apart))]:.4g} s, where its wrap is below zero; there the result is "
+                    "wrong, because the pulley pulls it. Give the rope more turns, or end the motion before"
                 )
     return found
 
@@ -438,6 +438,11 @@ def acceleration_violation(result: Result) -> float:
 def energy_drift(result: Result) -> float:
     """Return the largest deviation from the energy balance [J] at recorded times; nan if there are fewer than two."""
     return float(np.abs(result.budget.balance).max()) if len(result.t) > 1 else float("nan")
+
+
+def rest_warnings(result: Result) -> tuple[str, ...]:
+    """Return warnings on one-sided parts that pull at an equilibrium, and on tyres beyond the ranges of their files."""
+    return (*pull_warnings(result), *unwrapped_rope_warnings(result), *tyre_warnings(result))
 
 
 def motion_warnings(result: Result) -> tuple[str, ...]:

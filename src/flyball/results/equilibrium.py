@@ -119,7 +119,7 @@ class Equilibrium:
     touching : tuple of Touch
         State of every closed contact, and of every active stop.
     notes : tuple of str
-        Further remarks, with contact.
+        Further remarks: on contact, and on ropes, wheels and tyres that pull or leave their range.
     broken : tuple of str
         Shear pins that broke in the motion ``start``.
     """

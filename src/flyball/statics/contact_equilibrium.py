@@ -422,7 +422,8 @@ def _contact_equilibrium_result(
     touches = touch_states(place, found, x, *held)
     result = snapshot(MechanismState.resting(c, x.t, x.q, found.lam))
     result.contacts = contact_table(place, found.force)
-    notes = (*_equilibrium_notes(touches, found, missing), *event_notes(model))
+    smooth_notes = smooth_result.notes if smooth_result else ()
+    notes = (*_equilibrium_notes(touches, found, missing), *event_notes(model), *smooth_notes)
     kind = smooth_result.stability if smooth_result else NOT_JUDGED
     if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_OPEN) for k in touches) and kind != "unstable":
         kind = MARGINAL

@@ -38,6 +38,7 @@ from ..model.joint import Joint
 from ..model.messages import listing, suggest
 from ..model.names import curve_parts
 from ..numerics.rank import clearly_independent
+from ..results.diagnostics import rest_warnings
 from ..results.equilibrium import Equilibrium, FreeStiffness
 from ..simulation.initial_state import choose_coordinates
 from ..tables.forest import coordinate_row
@@ -61,13 +62,15 @@ def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> 
     """
     s = stability(x)
     x.c.at(x.t, x.q, np.zeros(len(x.scale)))
+    result = snapshot(MechanismState.resting(x.c, x.t, x.q, x.lam))
     return Equilibrium(
         t=x.t,
         stability=s.kind,
         unbalanced=x.unbalanced(),
         method=method,
         parameters=dict(x.c.parameters),
-        result=snapshot(MechanismState.resting(x.c, x.t, x.q, x.lam)),
+        result=result,
+        notes=rest_warnings(result),
         assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
         preload=preload,
         kinks=s.kinks,
