@@ -502,3 +502,15 @@ def test_refused_friction(fields, why):
     own = {"name": "rope", "bodies": ("ground", "ground", "load")} | own | fields
     with pytest.raises(ModelError, match=why):
         m.add(fb.Rope(**own))
+
+
+def test_an_equilibrium_names_a_rope_that_has_left_its_pulley():
+    """A spring lifts the load above the pulley, which no rope would then touch."""
+    m = fb.Mechanism("off", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("b", mass=1, inertia=0.01, position=(1.1, -1)))
+    ends = ("ground", "ground", "b")
+    m.add(fb.Rope("r", ends, at=((0, 0), (1, 0), (1.1, -1)), radii=(0, -0.1, 0), stiffness=1e4, damping=100))
+    m.add(fb.CoordinateSpring("upright", "b.angle", stiffness=5, damping=1))
+    assert not m.equilibrium().notes
+    m.add(fb.SpringDamper("lift", "ground", "b", at=((1.1, 3), (1.1, -1)), stiffness=200, damping=20, length=0.5))
+    assert any("has left the pulley" in note for note in m.equilibrium().notes)
