@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_OPEN = "sticks", "smooth", "at its friction limit", "about to open"
-CLOSED = "closed"
+STICKS, FRICTIONLESS, CLOSED = "sticks", "smooth", "closed"
+AT_FRICTION_LIMIT, ABOUT_TO_OPEN = "at its friction limit", "about to open"
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Touch:
         Distance of the surfaces; below 0 they overlap.
     unit : str
         ``"N"``, or ``"N*m"`` of what acts along an angle.
+    capacity : bool
+        Whether ``normal`` is a capacity.
     """
 
     name: str
@@ -53,7 +55,7 @@ class Touch:
     used: float = 0.0
     gap: float = 0.0
     unit: str = "N"
-    capacity: bool = False  # whether ``normal`` is a capacity
+    capacity: bool = False
 
     def __str__(self) -> str:
         unit = self.unit.replace("*", " ")
@@ -95,14 +97,6 @@ class Equilibrium:
         reason in ``notes``.
     judged_by : str
         The criterion, with controllers.
-    freedoms : tuple of str
-        Coordinates of the stiffness.
-    stiffness : ndarray (f, f)
-        Stiffness matrix; with controllers for constant states and held signals. It then does not decide stability.
-    weakest : dict
-        Direction of lowest stiffness: coordinate -> component.
-    least : float
-        That stiffness: energy per square of the mechanism's length or radian, relative to the largest force term.
     preload : dict
         Force -> offset added to its law [its unit].
     speeds : dict
@@ -122,6 +116,10 @@ class Equilibrium:
         Further remarks: on contact, and on ropes, wheels and tyres that pull or leave their range.
     broken : tuple of str
         Shear pins that broke in the motion ``start``.
+    switch_curves : dict
+        Curves of stops, ropes, latches, brakes and clutches by name, such as ``"stop.force"``: their values at rest.
+    free_stiffness : callable
+        Returns the stiffness of the free motions; dense, and computed when it is first needed.
     """
 
     t: float
@@ -138,8 +136,8 @@ class Equilibrium:
     touching: tuple[Touch, ...] = ()
     notes: tuple[str, ...] = ()
     broken: tuple[str, ...] = ()
-    switch_curves: dict[str, float] = field(default_factory=dict, repr=False)  # of stops, ropes, latches, brakes
-    free_stiffness: Callable[[], FreeStiffness] = field(default=FreeStiffness, repr=False)  # dense, and slow if large
+    switch_curves: dict[str, float] = field(default_factory=dict, repr=False)
+    free_stiffness: Callable[[], FreeStiffness] = field(default=FreeStiffness, repr=False)
 
     @cached_property
     def _free(self) -> FreeStiffness:
@@ -152,7 +150,7 @@ class Equilibrium:
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Stiffness matrix (f, f)."""
+        """Stiffness matrix (f, f); with controllers for constant states and held signals, when it decides nothing."""
         return self._free.stiffness
 
     @property
@@ -162,7 +160,7 @@ class Equilibrium:
 
     @property
     def least(self) -> float:
-        """Lowest stiffness relative to the largest force term."""
+        """Lowest stiffness: energy per square of the length or radian, relative to the largest force term."""
         return self._free.least
 
     def __getitem__(self, name: str) -> Any:

@@ -310,7 +310,7 @@ class Health:
     contact: ContactHealth | None = None  # contact solver, if there are contacts
 
     @property
-    def _simulated(self) -> bool:
+    def simulated(self) -> bool:
         """Return whether these are figures of a motion, rather than of one state."""
         return "energy_drift" in self.late
 
@@ -323,7 +323,7 @@ class Health:
     @property
     def status(self) -> str:
         """How it ended: ``"done"``, or the time and the event of the model that stopped it, or the error."""
-        end = "done" if self.success and self._simulated and not self.ended_early else self.message
+        end = "done" if self.success and self.simulated and not self.ended_early else self.message
         return f"{end}, but doubtful" if self.success and self.doubtful else end
 
     @property
@@ -354,7 +354,7 @@ class Health:
     @property
     def energy_drift(self) -> float:
         """Largest deviation from the energy balance [J]; 0 if nothing was simulated, nan if not measured."""
-        return self._found("energy_drift") if self._simulated else 0.0
+        return self._found("energy_drift") if self.simulated else 0.0
 
     @property
     def balance(self) -> str:
@@ -410,7 +410,7 @@ class Health:
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
             ("time used", f"{self.seconds:.2f} s{self._compiled}"),
         ]
-        out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
+        out = [line for line in out if self.simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []
         if self.redundant:
             more.append(("redundant", "; ".join(filter(None, (", ".join(self.redundant), self.redundant_cut)))))

@@ -454,7 +454,7 @@ def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | No
     old = before.values.structure
     c = compile_mechanism(model, parameters=parameters, tree=old.tree, switches=before.phases is not None)
     same = list(old.slices) == list(c.structure.slices) and old.states == c.structure.states
-    if len(before.t) == 1 and not same:  # of an equilibrium
+    if not before.health.simulated and not same:
         return _state_at_equilibrium(model, t, parameters, before)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
@@ -474,8 +474,9 @@ def _state_at_equilibrium(model: Model, t: float, parameters: Mapping[str, float
     """Return the state of an equilibrium in whose model constraints stand for the stops and contacts that hold."""
     c = compile_mechanism(model, parameters=parameters)
     old = rest.values.structure
-    if list(old.place) != list(c.structure.place):
-        raise ModelError(f"the equilibrium of {rest.model.name!r} is of a mechanism with other bodies")
+    joints, known = ({j.name for j in m.joints} for m in (model, rest.model))
+    if list(old.place) != list(c.structure.place) or not joints <= known:
+        raise ModelError(f"the equilibrium of {rest.model.name!r} is of a mechanism with other bodies or joints")
     q, v, z = np.split(rest.final[1], [old.nq, old.nq + old.nv])
     return Assembly(c, t, *c.take(CompiledMechanism(rest.values, z.copy()), t, q, v))
 

@@ -420,15 +420,22 @@ def solve_small_island(P, X, W, O, F, f):
 
 
 @formula
-def solve_islands(P, X, Y, W, O, F, f, count, some):
-    """Solve each island of the copy by its solver."""
-    Q, I = F.P, F.islands
-    copy_islands(P, X, Q, Y, F, I, count, some)
+def solve_small_islands(Q, Y, W, O, F, f, some):
+    """Solve the first islands of the copy by their solvers; returns the worst outcome."""
     sofar = (0.0, 0.0, 0, 0)
     for k in range(some):
         O.count.island = k
         solve_small_island(Q, Y, W, O, F, f)
         sofar = worst_outcome(O, sofar)
+    return sofar
+
+
+@formula
+def solve_islands(P, X, Y, W, O, F, f, count, some):
+    """Solve each island of the copy by its solver."""
+    Q, I = F.P, F.islands
+    copy_islands(P, X, Q, Y, F, I, count, some)
+    sofar = solve_small_islands(Q, Y, W, O, F, f, some)
     if some < count:
         O.count.island = some
         call(F.doors[OTHER_SOLVER], Q, Y, W, O, f, 0)
@@ -452,11 +459,7 @@ def solve_divided(P, X, Y, W, O, F, f, some):
     """As `solve_islands` where contacts are divided into blocks, without groups: only small islands are copied."""
     Q, I = F.P, F.islands
     copy_islands(P, X, Q, Y, F, I, some, some)
-    sofar = (0.0, 0.0, 0, 0)
-    for k in range(some):
-        O.count.island = k
-        solve_small_island(Q, Y, W, O, F, f)
-        sofar = worst_outcome(O, sofar)
+    sofar = solve_small_islands(Q, Y, W, O, F, f, some)
     O.count.island = -1
     mark_solved_nodes(P, I, F, some)
     call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
